@@ -14,6 +14,17 @@ pub const MAP: &str = "maps/board.bsp";
 const SIDE: f32 = 64.0;
 const STEP: f32 = 76.0;
 
+/// A quad across x that faces back towards the camera.
+pub fn screen(center: Vec3, half_width: f32, half_height: f32) -> [Vec3; 4] {
+    let (y, z) = (Vec3::Y * half_width, Vec3::Z * half_height);
+    [
+        center + y + z,
+        center - y + z,
+        center - y - z,
+        center + y - z,
+    ]
+}
+
 /// What kind of surface a tile is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
@@ -71,6 +82,14 @@ impl Board {
             columns,
             tiles: bodies.into_iter().map(tile).collect(),
             script: String::new(),
+        }
+    }
+
+    /// A room without tiles, with these shaders.
+    pub fn empty(script: &str) -> Self {
+        Self {
+            script: script.to_string(),
+            ..Self::new(4, Shape::Face, [""; 0])
         }
     }
 

@@ -1,7 +1,7 @@
 //! `rgbGen` and `alphaGen`: every kind, every wave.
 
-use super::Scene;
 use super::board::{Board, Shape};
+use super::{Scene, scene_list};
 
 /// The waves of the language; noise has rules of its own.
 const FUNCTIONS: [&str; 5] = ["sin", "square", "triangle", "sawtooth", "inversesawtooth"];
@@ -139,150 +139,28 @@ fn portal_alpha() -> Board {
     Board::new(4, Shape::Squares(4), stages.into_iter().chain([none]))
 }
 
-/// A scene that shows a board.
-macro_rules! board_scene {
-    ($name:literal, $about:literal, $board:expr, $times:expr) => {
-        Scene {
-            files: || $board.files(),
-            ..Scene::new($name, $about, |stage| $board.play(stage, $times))
-        }
-    };
-}
-pub(super) use board_scene;
-
 /// The scenes of this module.
 pub(super) fn scenes() -> Vec<Scene> {
-    vec![
-        Scene {
-            quick: true,
-            ..board_scene!(
-                "rgb-waves",
-                "rgbGen wave: every function.",
-                rgb_waves(),
-                &TIMES
-            )
-        },
-        board_scene!(
-            "alpha-waves",
-            "alphaGen wave: every function.",
-            alpha_waves(),
-            &TIMES
-        ),
-        Scene {
-            cvars: &[("r_greyscale", "1")],
-            quick: true,
-            ..board_scene!("rgb-grey", "Every colour with r_greyscale 1.", grey(), &[0])
-        },
-        Scene {
-            cvars: &[("r_greyscale", "0.4")],
-            ..board_scene!(
-                "rgb-half-grey",
-                "Every colour with r_greyscale 0.4.",
-                grey(),
-                &[0]
-            )
-        },
-        board_scene!(
-            "rgb-noise",
-            "rgbGen wave noise.",
-            noise(),
-            &[0, 337, 1250, 40_000]
-        ),
-        Scene {
-            quick: true,
-            ..board_scene!(
-                "rgb-face",
-                "rgbGen on faces.",
-                rgb_kinds(Shape::Face),
-                &[0, 700]
-            )
-        },
-        board_scene!(
-            "rgb-soup",
-            "rgbGen on triangle soups.",
-            rgb_kinds(Shape::Squares(3)),
-            &[0]
-        ),
-        board_scene!(
-            "rgb-patch",
-            "rgbGen on patches.",
-            rgb_kinds(Shape::Patch),
-            &[0]
-        ),
-        Scene {
-            quick: true,
-            ..board_scene!(
-                "rgb-model",
-                "rgbGen on models.",
-                rgb_kinds(Shape::Model),
-                &[0, 700]
-            )
-        },
-        board_scene!(
-            "rgb-poly",
-            "rgbGen on polygons.",
-            rgb_kinds(Shape::Poly),
-            &[0, 700]
-        ),
-        board_scene!(
-            "rgb-sprite",
-            "rgbGen on sprites.",
-            rgb_kinds(Shape::Sprite),
-            &[0, 700]
-        ),
-        board_scene!(
-            "rgb-picture",
-            "rgbGen in 2D.",
-            rgb_kinds(Shape::Picture),
-            &[0, 700]
-        ),
-        Scene {
-            quick: true,
-            ..board_scene!(
-                "alpha-face",
-                "alphaGen on faces.",
-                alpha_kinds(Shape::Face),
-                &[0, 700]
-            )
-        },
-        board_scene!(
-            "alpha-soup",
-            "alphaGen on soups.",
-            alpha_kinds(Shape::Dome(6)),
-            &[0]
-        ),
-        Scene {
-            quick: true,
-            ..board_scene!(
-                "alpha-model",
-                "alphaGen on models.",
-                alpha_kinds(Shape::Model),
-                &[0]
-            )
-        },
-        board_scene!(
-            "alpha-poly",
-            "alphaGen on polygons.",
-            alpha_kinds(Shape::Poly),
-            &[0]
-        ),
-        board_scene!(
-            "alpha-sprite",
-            "alphaGen on sprites.",
-            alpha_kinds(Shape::Sprite),
-            &[0]
-        ),
-        board_scene!(
-            "alpha-picture",
-            "alphaGen in 2D.",
-            alpha_kinds(Shape::Picture),
-            &[0]
-        ),
-        board_scene!(
-            "alpha-portal",
-            "alphaGen portal: fades by distance.",
-            portal_alpha(),
-            &[0]
-        ),
-    ]
+    scene_list! {
+        "rgb-waves": "rgbGen wave: every function.", board(rgb_waves(), &TIMES), quick: true;
+        "alpha-waves": "alphaGen wave: every function.", board(alpha_waves(), &TIMES);
+        "rgb-grey": "Every colour with r_greyscale 1.",
+            board(grey(), &[0]), cvars: &[("r_greyscale", "1")], quick: true;
+        "rgb-half-grey": "Every colour with r_greyscale 0.4.", board(grey(), &[0]), cvars: &[("r_greyscale", "0.4")];
+        "rgb-noise": "rgbGen wave noise.", board(noise(), &[0, 337, 1250, 40_000]);
+        "rgb-face": "rgbGen on faces.", board(rgb_kinds(Shape::Face), &[0, 700]), quick: true;
+        "rgb-soup": "rgbGen on triangle soups.", board(rgb_kinds(Shape::Squares(3)), &[0]);
+        "rgb-patch": "rgbGen on patches.", board(rgb_kinds(Shape::Patch), &[0]);
+        "rgb-model": "rgbGen on models.", board(rgb_kinds(Shape::Model), &[0, 700]), quick: true;
+        "rgb-poly": "rgbGen on polygons.", board(rgb_kinds(Shape::Poly), &[0, 700]);
+        "rgb-sprite": "rgbGen on sprites.", board(rgb_kinds(Shape::Sprite), &[0, 700]);
+        "rgb-picture": "rgbGen in 2D.", board(rgb_kinds(Shape::Picture), &[0, 700]);
+        "alpha-face": "alphaGen on faces.", board(alpha_kinds(Shape::Face), &[0, 700]), quick: true;
+        "alpha-soup": "alphaGen on soups.", board(alpha_kinds(Shape::Dome(6)), &[0]);
+        "alpha-model": "alphaGen on models.", board(alpha_kinds(Shape::Model), &[0]), quick: true;
+        "alpha-poly": "alphaGen on polygons.", board(alpha_kinds(Shape::Poly), &[0]);
+        "alpha-sprite": "alphaGen on sprites.", board(alpha_kinds(Shape::Sprite), &[0]);
+        "alpha-picture": "alphaGen in 2D.", board(alpha_kinds(Shape::Picture), &[0]);
+        "alpha-portal": "alphaGen portal: fades by distance.", board(portal_alpha(), &[0]);
+    }
 }

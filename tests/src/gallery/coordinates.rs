@@ -1,8 +1,7 @@
 //! `tcGen` and `tcMod`: every kind, alone and in orders.
 
-use super::Scene;
 use super::board::{Board, Shape};
-use super::colors::board_scene;
+use super::{Scene, scene_list};
 
 const TIMES: [i32; 3] = [0, 337, 61_250];
 
@@ -108,103 +107,22 @@ fn levels() -> Board {
 
 /// The scenes of this module.
 pub(super) fn scenes() -> Vec<Scene> {
-    vec![
-        Scene {
-            quick: true,
-            ..board_scene!(
-                "tcgen-soup",
-                "tcGen on soups.",
-                generators(Shape::Dome(8)),
-                &[0]
-            )
-        },
-        board_scene!(
-            "tcgen-face",
-            "tcGen on faces.",
-            generators(Shape::Face),
-            &[0]
-        ),
-        board_scene!(
-            "tcgen-patch",
-            "tcGen on patches.",
-            generators(Shape::Patch),
-            &[0]
-        ),
-        board_scene!(
-            "tcgen-model",
-            "tcGen on models.",
-            generators(Shape::Model),
-            &[0]
-        ),
-        board_scene!(
-            "tcgen-poly",
-            "tcGen on polygons.",
-            generators(Shape::Poly),
-            &[0]
-        ),
-        board_scene!(
-            "tcgen-sprite",
-            "tcGen on sprites.",
-            generators(Shape::Sprite),
-            &[0]
-        ),
-        board_scene!(
-            "tcgen-picture",
-            "tcGen in 2D.",
-            generators(Shape::Picture),
-            &[0]
-        ),
-        Scene {
-            quick: true,
-            ..board_scene!(
-                "tcmod-face",
-                "tcMod on faces.",
-                modifiers(Shape::Face),
-                &TIMES
-            )
-        },
-        board_scene!(
-            "tcmod-soup",
-            "tcMod on soups.",
-            modifiers(Shape::Squares(4)),
-            &TIMES
-        ),
-        board_scene!(
-            "tcmod-model",
-            "tcMod on models.",
-            modifiers(Shape::Model),
-            &TIMES
-        ),
-        board_scene!(
-            "tcmod-sprite",
-            "tcMod on sprites.",
-            modifiers(Shape::Sprite),
-            &TIMES
-        ),
-        board_scene!(
-            "tcmod-poly",
-            "tcMod on polygons.",
-            modifiers(Shape::Poly),
-            &[337]
-        ),
-        board_scene!(
-            "tcmod-picture",
-            "tcMod in 2D.",
-            modifiers(Shape::Picture),
-            &TIMES
-        ),
-        board_scene!(
-            "tc-together",
-            "tcGen with tcMod.",
-            together(Shape::Dome(8)),
-            &[0, 700]
-        ),
-        board_scene!(
-            "tc-model",
-            "The same on models.",
-            together(Shape::Model),
-            &[0, 700]
-        ),
-        board_scene!("tc-levels", "Mip levels.", levels(), &[0]),
-    ]
+    scene_list! {
+        "tcgen-soup": "tcGen on soups.", board(generators(Shape::Dome(8)), &[0]), quick: true;
+        "tcgen-face": "tcGen on faces.", board(generators(Shape::Face), &[0]);
+        "tcgen-patch": "tcGen on patches.", board(generators(Shape::Patch), &[0]);
+        "tcgen-model": "tcGen on models.", board(generators(Shape::Model), &[0]);
+        "tcgen-poly": "tcGen on polygons.", board(generators(Shape::Poly), &[0]);
+        "tcgen-sprite": "tcGen on sprites.", board(generators(Shape::Sprite), &[0]);
+        "tcgen-picture": "tcGen in 2D.", board(generators(Shape::Picture), &[0]);
+        "tcmod-face": "tcMod on faces.", board(modifiers(Shape::Face), &TIMES), quick: true;
+        "tcmod-soup": "tcMod on soups.", board(modifiers(Shape::Squares(4)), &TIMES);
+        "tcmod-model": "tcMod on models.", board(modifiers(Shape::Model), &TIMES);
+        "tcmod-sprite": "tcMod on sprites.", board(modifiers(Shape::Sprite), &TIMES);
+        "tcmod-poly": "tcMod on polygons.", board(modifiers(Shape::Poly), &[337]);
+        "tcmod-picture": "tcMod in 2D.", board(modifiers(Shape::Picture), &TIMES);
+        "tc-together": "tcGen with tcMod.", board(together(Shape::Dome(8)), &[0, 700]);
+        "tc-model": "The same on models.", board(together(Shape::Model), &[0, 700]);
+        "tc-levels": "Mip levels.", board(levels(), &[0]);
+    }
 }

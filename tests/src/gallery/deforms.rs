@@ -1,8 +1,7 @@
 //! `deformVertexes`: every kind.
 
 use super::board::{Board, Shape};
-use super::colors::board_scene;
-use super::{Scene, Stage};
+use super::{Scene, Stage, scene_list};
 use crate::engine::Raised;
 
 const TIMES: [i32; 3] = [0, 337, 2_250];
@@ -119,64 +118,24 @@ fn aside(stage: &mut Stage, board: &Board) -> Result<(), Raised> {
 
 /// The scenes of this module.
 pub(super) fn scenes() -> Vec<Scene> {
-    vec![
-        Scene {
-            quick: true,
-            ..board_scene!(
-                "deform-soup",
-                "deformVertexes on soups.",
-                kinds(Shape::Dome(10)),
-                &TIMES
-            )
-        },
-        board_scene!(
-            "deform-squares",
-            "On unconnected squares.",
-            kinds(Shape::Squares(5)),
-            &TIMES
-        ),
-        board_scene!("deform-face", "On faces.", kinds(Shape::Face), &TIMES),
-        board_scene!("deform-patch", "On patches.", kinds(Shape::Patch), &TIMES),
-        board_scene!("deform-model", "On models.", kinds(Shape::Model), &TIMES),
-        board_scene!("deform-sprite", "On sprites.", kinds(Shape::Sprite), &[337]),
-        board_scene!("deform-poly", "On polygons.", kinds(Shape::Poly), &[337]),
-        board_scene!("deform-picture", "In 2D.", kinds(Shape::Picture), &[337]),
-        board_scene!(
-            "deform-normal",
-            "deformVertexes normal on soups.",
-            normals(Shape::Dome(8)),
-            &TIMES
-        ),
-        board_scene!(
-            "deform-normal-model",
-            "On models.",
-            normals(Shape::Model),
-            &TIMES
-        ),
-        Scene {
-            files: || sprites(Shape::Squares(2)).files(),
-            quick: true,
-            ..Scene::new(
-                "autosprite",
-                "deformVertexes autosprite and autosprite2.",
-                |stage| aside(stage, &sprites(Shape::Squares(2))),
-            )
-        },
-        Scene {
-            files: || sprites(Shape::Face).files(),
-            ..Scene::new("autosprite-face", "The same on faces.", |stage| {
-                aside(stage, &sprites(Shape::Face))
-            })
-        },
-        Scene {
-            files: || sprites(Shape::Sprite).files(),
-            ..Scene::new("autosprite-sprite", "The same on sprites.", |stage| {
-                aside(stage, &sprites(Shape::Sprite))
-            })
-        },
-        Scene {
-            files: || text().files(),
-            ..Scene::new("deform-text", "deformVertexes text0 to text7.", play_text)
-        },
-    ]
+    scene_list! {
+        "deform-soup": "deformVertexes on soups.", board(kinds(Shape::Dome(10)), &TIMES), quick: true;
+        "deform-squares": "On unconnected squares.", board(kinds(Shape::Squares(5)), &TIMES);
+        "deform-face": "On faces.", board(kinds(Shape::Face), &TIMES);
+        "deform-patch": "On patches.", board(kinds(Shape::Patch), &TIMES);
+        "deform-model": "On models.", board(kinds(Shape::Model), &TIMES);
+        "deform-sprite": "On sprites.", board(kinds(Shape::Sprite), &[337]);
+        "deform-poly": "On polygons.", board(kinds(Shape::Poly), &[337]);
+        "deform-picture": "In 2D.", board(kinds(Shape::Picture), &[337]);
+        "deform-normal": "deformVertexes normal on soups.", board(normals(Shape::Dome(8)), &TIMES);
+        "deform-normal-model": "On models.", board(normals(Shape::Model), &TIMES);
+        "autosprite": "deformVertexes autosprite and autosprite2.",
+            calls(|stage| aside(stage, &sprites(Shape::Squares(2)))), files: || sprites(Shape::Squares(2)).files(),
+            quick: true;
+        "autosprite-face": "The same on faces.",
+            calls(|stage| aside(stage, &sprites(Shape::Face))), files: || sprites(Shape::Face).files();
+        "autosprite-sprite": "The same on sprites.",
+            calls(|stage| aside(stage, &sprites(Shape::Sprite))), files: || sprites(Shape::Sprite).files();
+        "deform-text": "deformVertexes text0 to text7.", calls(play_text), files: || text().files();
+    }
 }

@@ -3,9 +3,8 @@
 use glam::Vec3;
 use q3bsp::builder::MapBuilder;
 
-use super::board::{Board, MAP, Shape};
-use super::models::turned;
-use super::{File, Scene, Stage, tube};
+use super::board::{Board, MAP, screen};
+use super::{File, Scene, Stage, entities, scene_list, tube};
 use crate::engine::Raised;
 use crate::engine::abi::refEntity_t;
 
@@ -15,92 +14,28 @@ const NO_WORLD: i32 = 1;
 
 /// The scenes of this module.
 pub(super) fn scenes() -> Vec<Scene> {
-    let scene = |name, about, cvars, play| Scene {
-        files,
-        cvars,
-        ..Scene::new(name, about, play)
-    };
-    vec![
-        Scene {
-            quick: true,
-            ..scene(
-                "effects-flares",
-                "Flares that appear, stay, are hidden and go, straight on and aside.",
-                &[("r_flares", "1")],
-                flares,
-            )
-        },
-        scene(
-            "effects-flares-grey",
-            "The same with half the colour.",
-            &[("r_flares", "1"), ("r_greyscale", "0.5")],
-            flares,
-        ),
-        Scene {
-            quick: true,
-            ..scene(
-                "effects-clear",
-                "What r_clear and r_fastsky clear before views of a part of the window.",
-                &[],
-                cleared,
-            )
-        },
-        Scene {
-            quick: true,
-            ..scene(
-                "effects-eyes",
-                "Each anaglyph mode, the eyes' distance and where their pictures meet.",
-                &[],
-                eyes,
-            )
-        },
-        scene(
-            "effects-gamma",
-            "r_gamma by the display's ramp, grey and brighter textures, stored light shifted further.",
-            &[
-                ("r_gamma", "1.5"),
-                ("r_intensity", "1.6"),
-                ("r_greyscale", "0.5"),
-                ("r_mapOverBrightBits", "3"),
-            ],
-            bright,
-        ),
-        scene(
-            "effects-software-gamma",
-            "r_gamma in textures alone; all grey.",
-            &[
-                ("r_ignorehwgamma", "1"),
-                ("r_gamma", "1.8"),
-                ("r_greyscale", "1"),
-                ("r_mapOverBrightBits", "1"),
-            ],
-            bright,
-        ),
-        scene(
-            "effects-dark-gamma",
-            "A darker r_gamma in textures, overbright bits without effect in a window.",
-            &[
-                ("r_ignorehwgamma", "1"),
-                ("r_gamma", "0.7"),
-                ("r_intensity", "2"),
-                ("r_overBrightBits", "2"),
-            ],
-            bright,
-        ),
-        Scene {
-            files: mirror_files,
-            ..scene(
-                "effects-mirror",
-                "Stencil shadows and flares in a mirror.",
-                &[
-                    ("cg_shadows", "2"),
-                    ("r_stencilbits", "8"),
-                    ("r_flares", "1"),
-                ],
-                mirror,
-            )
-        },
-    ]
+    scene_list! {
+        "effects-flares": "Flares that appear, stay, are hidden and go, straight on and aside.",
+            calls(flares), files: files, cvars: &[("r_flares", "1")], quick: true;
+        "effects-flares-grey": "The same with half the colour.",
+            calls(flares), files: files, cvars: &[("r_flares", "1"), ("r_greyscale", "0.5")];
+        "effects-clear": "What r_clear and r_fastsky clear before views of a part of the window.",
+            calls(cleared), files: files, quick: true;
+        "effects-eyes": "Each anaglyph mode, the eyes' distance and where their pictures meet.",
+            calls(eyes), files: files, quick: true;
+        "effects-gamma": "r_gamma by the display's ramp, grey and brighter textures, stored light shifted further.",
+            calls(bright), files: files,
+            cvars: &[("r_gamma", "1.5"), ("r_intensity", "1.6"), ("r_greyscale", "0.5"), ("r_mapOverBrightBits", "3")];
+        "effects-software-gamma": "r_gamma in textures alone; all grey.",
+            calls(bright), files: files,
+            cvars: &[("r_ignorehwgamma", "1"), ("r_gamma", "1.8"), ("r_greyscale", "1"), ("r_mapOverBrightBits", "1")];
+        "effects-dark-gamma": "A darker r_gamma in textures, overbright bits without effect in a window.",
+            calls(bright), files: files,
+            cvars: &[("r_ignorehwgamma", "1"), ("r_gamma", "0.7"), ("r_intensity", "2"), ("r_overBrightBits", "2")];
+        "effects-mirror": "Stencil shadows and flares in a mirror.",
+            calls(mirror), files: mirror_files,
+            cvars: &[("cg_shadows", "2"), ("r_stencilbits", "8"), ("r_flares", "1")];
+    }
 }
 
 const SCRIPT: &str = "
@@ -131,10 +66,7 @@ e/mirror
 ";
 
 fn board() -> Board {
-    Board {
-        script: SCRIPT.to_string(),
-        ..Board::new(4, Shape::Face, [""; 0])
-    }
+    Board::empty(SCRIPT)
 }
 
 /// The board's room with flares, one of them turned away.
@@ -162,27 +94,14 @@ fn files() -> Vec<File> {
 fn mirror_files() -> Vec<File> {
     let mut map = map();
     let mirror = map.add_shader("e/mirror", 0, 1);
-    let corner = |y: f32, z: f32| Vec3::new(36.0, y * 64.0, z * 64.0);
-    let corners = [
-        corner(1.0, 1.0),
-        corner(-1.0, 1.0),
-        corner(-1.0, -1.0),
-        corner(1.0, -1.0),
-    ];
-    map.add_quad(mirror, corners);
+    map.add_quad(mirror, screen(Vec3::X * 36.0, 64.0, 64.0));
     with_models(board().files_with(map))
 }
 
 fn tube_at(stage: &mut Stage, at: Vec3) -> Result<refEntity_t, Raised> {
-    Ok(refEntity_t {
-        hModel: stage.register_model("m/key.md3")?,
-        customShader: stage.register_shader("e/solid")?,
-        origin: at.to_array(),
-        axis: turned(25.0),
-        frame: 1,
-        oldframe: 1,
-        ..refEntity_t::default()
-    })
+    let mut tube = entities::tube_at(stage, at)?;
+    tube.customShader = stage.register_shader("e/solid")?;
+    Ok(tube)
 }
 
 fn flares(stage: &mut Stage) -> Result<(), Raised> {

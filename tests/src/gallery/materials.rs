@@ -2,9 +2,8 @@
 
 use glam::Vec3;
 
-use super::board::{Board, MAP, Shape};
-use super::colors::board_scene;
-use super::{File, Scene, Stage};
+use super::board::{Board, MAP, Shape, screen};
+use super::{File, Scene, Stage, scene_list};
 use crate::engine::Raised;
 
 const SORTS: [&str; 20] = [
@@ -51,16 +50,7 @@ fn sort_files() -> Vec<File> {
         let shader = map.add_shader(&Board::name(tile), 0, 1);
         let depth = if tile % 2 == 0 { 4.0 } else { -4.0 };
         let center = board.center(tile) + Vec3::new(depth, -38.0, -38.0);
-        let (y, z) = (Vec3::Y * 30.0, Vec3::Z * 30.0);
-        map.add_quad(
-            shader,
-            [
-                center + y + z,
-                center - y + z,
-                center - y - z,
-                center + y - z,
-            ],
-        );
+        map.add_quad(shader, screen(center, 30.0, 30.0));
     }
     board.files_with(map)
 }
@@ -91,16 +81,8 @@ fn cull_files() -> Vec<File> {
     for tile in 0..board.tiles.len() {
         let shader = map.add_shader(&Board::name(tile), 0, 1);
         let center = board.center(tile) + Vec3::new(-10.0, 20.0, 20.0);
-        let (y, z) = (Vec3::Y * 20.0, Vec3::Z * 20.0);
-        map.add_quad(
-            shader,
-            [
-                center + y + z,
-                center + y - z,
-                center - y - z,
-                center - y + z,
-            ],
-        );
+        let [a, b, c, d] = screen(center, 20.0, 20.0);
+        map.add_quad(shader, [a, d, c, b]);
     }
     board.files_with(map)
 }
@@ -359,107 +341,31 @@ raise/tcmods\n{\n{\nmap g/base.tga\ntcMod scale 1 1\ntcMod scale 1 1\ntcMod scal
 
 /// The scenes of this module.
 pub(super) fn scenes() -> Vec<Scene> {
-    vec![
-        Scene {
-            files: sort_files,
-            quick: true,
-            ..Scene::new("sort", "sort by name, by number, by default.", |stage| {
-                sorts().play(stage, &[0])
-            })
-        },
-        Scene {
-            files: cull_files,
-            quick: true,
-            ..Scene::new("cull-face", "cull, from both sides.", |stage| {
-                culls(Shape::Face).play(stage, &[0])
-            })
-        },
-        board_scene!("cull-model", "cull on models.", culls(Shape::Model), &[0]),
-        board_scene!(
-            "cull-sprite",
-            "cull on sprites.",
-            culls(Shape::Sprite),
-            &[0]
-        ),
-        board_scene!("cull-poly", "cull on polygons.", culls(Shape::Poly), &[0]),
-        Scene {
-            files: offset_files,
-            ..Scene::new(
-                "polygon-offset",
-                "polygonOffset in one plane with the wall.",
-                play_offsets,
-            )
-        },
-        board_scene!(
-            "time-face",
-            "clampTime and words without effect.",
-            times(Shape::Face),
-            &[0, 2000]
-        ),
-        board_scene!(
-            "time-model",
-            "The same on models.",
-            times(Shape::Model),
-            &[0, 2000]
-        ),
-        board_scene!(
-            "time-picture",
-            "The same in 2D.",
-            times(Shape::Picture),
-            &[0, 2000]
-        ),
-        Scene {
-            quick: true,
-            ..board_scene!("malformed", "Malformed and odd scripts.", malformed(), &[0])
-        },
-        board_scene!("limits", "More than allowed.", limits(), &[0]),
-        board_scene!("implicit", "Without a script.", implicit(), &[0]),
-        Scene {
-            cvars: &[("r_vertexLight", "1")],
-            ..board_scene!(
-                "implicit-vertex",
-                "Without a script, r_vertexLight.",
-                implicit(),
-                &[0]
-            )
-        },
-        Scene {
-            cvars: &[("r_fullbright", "1")],
-            ..board_scene!(
-                "implicit-bright",
-                "Without a script, r_fullbright.",
-                implicit(),
-                &[0]
-            )
-        },
-        Scene {
-            files: || fog_files(Shape::Face),
-            quick: true,
-            ..Scene::new("fog-face", "Stages in fog.", |stage| {
-                play_fog(stage, Shape::Face)
-            })
-        },
-        Scene {
-            files: || fog_files(Shape::Squares(4)),
-            ..Scene::new("fog-soup", "Stages of soups in fog.", |stage| {
-                play_fog(stage, Shape::Squares(4))
-            })
-        },
-        Scene {
-            files: || fog_files(Shape::Model),
-            ..Scene::new("fog-model", "Models in fog.", |stage| {
-                play_fog(stage, Shape::Model)
-            })
-        },
-        Scene {
-            files: || fog_files(Shape::Sprite),
-            ..Scene::new("fog-sprite", "Sprites in fog.", |stage| {
-                play_fog(stage, Shape::Sprite)
-            })
-        },
-        Scene {
-            files: raise_files,
-            ..Scene::new("raise", "What ends in an error.", raise)
-        },
-    ]
+    scene_list! {
+        "sort": "sort by name, by number, by default.",
+            calls(|stage| sorts().play(stage, &[0])), files: sort_files, quick: true;
+        "cull-face": "cull, from both sides.",
+            calls(|stage| culls(Shape::Face).play(stage, &[0])), files: cull_files, quick: true;
+        "cull-model": "cull on models.", board(culls(Shape::Model), &[0]);
+        "cull-sprite": "cull on sprites.", board(culls(Shape::Sprite), &[0]);
+        "cull-poly": "cull on polygons.", board(culls(Shape::Poly), &[0]);
+        "polygon-offset": "polygonOffset in one plane with the wall.", calls(play_offsets), files: offset_files;
+        "time-face": "clampTime and words without effect.", board(times(Shape::Face), &[0, 2000]);
+        "time-model": "The same on models.", board(times(Shape::Model), &[0, 2000]);
+        "time-picture": "The same in 2D.", board(times(Shape::Picture), &[0, 2000]);
+        "malformed": "Malformed and odd scripts.", board(malformed(), &[0]), quick: true;
+        "limits": "More than allowed.", board(limits(), &[0]);
+        "implicit": "Without a script.", board(implicit(), &[0]);
+        "implicit-vertex": "Without a script, r_vertexLight.",
+            board(implicit(), &[0]), cvars: &[("r_vertexLight", "1")];
+        "implicit-bright": "Without a script, r_fullbright.", board(implicit(), &[0]), cvars: &[("r_fullbright", "1")];
+        "fog-face": "Stages in fog.",
+            calls(|stage| play_fog(stage, Shape::Face)), files: || fog_files(Shape::Face), quick: true;
+        "fog-soup": "Stages of soups in fog.",
+            calls(|stage| play_fog(stage, Shape::Squares(4))), files: || fog_files(Shape::Squares(4));
+        "fog-model": "Models in fog.", calls(|stage| play_fog(stage, Shape::Model)), files: || fog_files(Shape::Model);
+        "fog-sprite": "Sprites in fog.",
+            calls(|stage| play_fog(stage, Shape::Sprite)), files: || fog_files(Shape::Sprite);
+        "raise": "What ends in an error.", calls(raise), files: raise_files;
+    }
 }

@@ -107,6 +107,27 @@ impl Scene {
     }
 }
 
+/// A list of scenes in rows: the name, what it shows, what it draws, and fields other than those of [`Scene::new`]. A
+/// scene draws a board at times, `board(board, times)`, or makes calls, `calls(function)`.
+macro_rules! scene_list {
+    ($($name:literal: $about:literal, $kind:ident($($what:expr),+) $(, $field:ident: $value:expr)*;)+) => {
+        vec![$(Scene {
+            $($field: $value,)*
+            ..scene_list!(@$kind $name, $about, $($what),+)
+        }),+]
+    };
+    (@board $name:literal, $about:literal, $board:expr, $times:expr) => {
+        Scene {
+            files: || $board.files(),
+            ..Scene::new($name, $about, |stage| $board.play(stage, $times))
+        }
+    };
+    (@calls $name:literal, $about:literal, $play:expr) => {
+        Scene::new($name, $about, $play)
+    };
+}
+use scene_list;
+
 /// Every scene.
 pub fn scenes() -> Vec<Scene> {
     let mut all = Vec::new();

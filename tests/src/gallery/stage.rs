@@ -8,6 +8,7 @@ use glam::Vec3;
 use relight::compare::Rgb8;
 
 use super::{Scene, textures};
+use crate::engine::abi::refEntity_t;
 use crate::engine::files::Packs;
 use crate::engine::{Engine, LoadError, Options, Raised, View};
 
@@ -141,6 +142,18 @@ impl Stage {
             engine.clear_scene()?;
             add(engine)?;
             engine.render_scene(view)
+        })
+    }
+
+    /// Keeps the world with these entities.
+    pub fn keep_entities(
+        &mut self,
+        name: &str,
+        view: &View,
+        all: &[refEntity_t],
+    ) -> Result<(), Raised> {
+        self.keep_view(name, view, |e| {
+            all.iter().try_for_each(|entity| e.add_entity(entity))
         })
     }
 

@@ -1,8 +1,7 @@
 //! Images, blending, alpha tests, depth.
 
-use super::board::{Board, Shape};
-use super::colors::board_scene;
-use super::{File, Scene, Stage};
+use super::board::{Board, Shape, screen};
+use super::{File, Scene, Stage, scene_list};
 use crate::engine::Raised;
 
 const SOURCES: [&str; 9] = [
@@ -122,16 +121,7 @@ fn depth_files() -> Vec<File> {
     for tile in 0..board.tiles.len() {
         // drawn last, behind the tile and past its edges
         let center = board.center(tile) + glam::Vec3::X * 8.0;
-        let (y, z) = (glam::Vec3::Y * 36.0, glam::Vec3::Z * 20.0);
-        map.add_quad(
-            shader,
-            [
-                center + y + z,
-                center - y + z,
-                center - y - z,
-                center + y - z,
-            ],
-        );
+        map.add_quad(shader, screen(center, 36.0, 20.0));
     }
     board.files_with(map)
 }
@@ -228,6 +218,12 @@ fn films() -> Board {
     .and(Shape::Model, ["{\nvideoMap film.roq\nrgbGen entity\n}"])
 }
 
+fn film_files() -> Vec<File> {
+    let mut files = films().files();
+    files.extend(["film", "other"].map(|name| (format!("video/{name}.roq"), vec![0; 16])));
+    files
+}
+
 fn play_films(stage: &mut Stage) -> Result<(), Raised> {
     let frame = |offset: usize| -> Vec<u8> {
         (0..256usize * 256)
@@ -250,114 +246,25 @@ fn play_films(stage: &mut Stage) -> Result<(), Raised> {
 
 /// The scenes of this module.
 pub(super) fn scenes() -> Vec<Scene> {
-    vec![
-        Scene {
-            quick: true,
-            ..board_scene!("blend-pairs", "Every pair of factors.", blends(), &[0])
-        },
-        Scene {
-            quick: true,
-            ..board_scene!(
-                "blend-alpha",
-                "The same over a first stage with alpha.",
-                blends_over_alpha(),
-                &[0]
-            )
-        },
-        board_scene!(
-            "blend-words",
-            "Short names and wrong ones.",
-            shorthand(),
-            &[0]
-        ),
-        Scene {
-            quick: true,
-            ..board_scene!(
-                "alpha-func",
-                "alphaFunc with and without blending.",
-                alpha_tests(),
-                &[0, 700]
-            )
-        },
-        Scene {
-            files: depth_files,
-            quick: true,
-            ..Scene::new("depth", "depthFunc, depthWrite, their order.", |stage| {
-                depth().play(stage, &[0])
-            })
-        },
-        Scene {
-            quick: true,
-            ..board_scene!(
-                "images",
-                "map, clampMap, animMap.",
-                images(),
-                &[0, 337, 1700]
-            )
-        },
-        board_scene!(
-            "collapse",
-            "Stages in one pass.",
-            collapse(Shape::Face),
-            &[0]
-        ),
-        board_scene!(
-            "collapse-soup",
-            "The same by vertex.",
-            collapse(Shape::Squares(3)),
-            &[0]
-        ),
-        board_scene!(
-            "collapse-model",
-            "The same on models.",
-            collapse(Shape::Model),
-            &[0]
-        ),
-        Scene {
-            cvars: &[("r_vertexLight", "1"), ("r_uifullscreen", "1")],
-            ..board_scene!(
-                "collapse-vertex-menu",
-                "With r_vertexLight while a menu covers the game.",
-                collapse(Shape::Face),
-                &[0]
-            )
-        },
-        Scene {
-            cvars: &[("r_vertexLight", "1")],
-            ..board_scene!(
-                "collapse-vertex",
-                "With r_vertexLight.",
-                collapse(Shape::Face),
-                &[0]
-            )
-        },
-        Scene {
-            cvars: &[("r_vertexLight", "1")],
-            ..board_scene!(
-                "collapse-vertex-model",
-                "With r_vertexLight, models.",
-                collapse(Shape::Skin),
-                &[0]
-            )
-        },
-        board_scene!("detail", "detail stages.", details(), &[0]),
-        Scene {
-            cvars: &[("r_detailtextures", "0")],
-            ..board_scene!(
-                "detail-off",
-                "detail stages with r_detailtextures 0.",
-                details(),
-                &[0]
-            )
-        },
-        Scene {
-            files: || {
-                let mut files = films().files();
-                files.push(("video/film.roq".into(), vec![0; 16]));
-                files.push(("video/other.roq".into(), vec![0; 16]));
-                files
-            },
-            ..Scene::new("films", "videoMap.", play_films)
-        },
-    ]
+    scene_list! {
+        "blend-pairs": "Every pair of factors.", board(blends(), &[0]), quick: true;
+        "blend-alpha": "The same over a first stage with alpha.", board(blends_over_alpha(), &[0]), quick: true;
+        "blend-words": "Short names and wrong ones.", board(shorthand(), &[0]);
+        "alpha-func": "alphaFunc with and without blending.", board(alpha_tests(), &[0, 700]), quick: true;
+        "depth": "depthFunc, depthWrite, their order.",
+            calls(|stage| depth().play(stage, &[0])), files: depth_files, quick: true;
+        "images": "map, clampMap, animMap.", board(images(), &[0, 337, 1700]), quick: true;
+        "collapse": "Stages in one pass.", board(collapse(Shape::Face), &[0]);
+        "collapse-soup": "The same by vertex.", board(collapse(Shape::Squares(3)), &[0]);
+        "collapse-model": "The same on models.", board(collapse(Shape::Model), &[0]);
+        "collapse-vertex-menu": "With r_vertexLight while a menu covers the game.",
+            board(collapse(Shape::Face), &[0]), cvars: &[("r_vertexLight", "1"), ("r_uifullscreen", "1")];
+        "collapse-vertex": "With r_vertexLight.", board(collapse(Shape::Face), &[0]), cvars: &[("r_vertexLight", "1")];
+        "collapse-vertex-model": "With r_vertexLight, models.",
+            board(collapse(Shape::Skin), &[0]), cvars: &[("r_vertexLight", "1")];
+        "detail": "detail stages.", board(details(), &[0]);
+        "detail-off": "detail stages with r_detailtextures 0.",
+            board(details(), &[0]), cvars: &[("r_detailtextures", "0")];
+        "films": "videoMap.", calls(play_films), files: film_files;
+    }
 }

@@ -5,7 +5,7 @@ mod pictures;
 mod views;
 
 use super::board::{Board, Shape};
-use super::{File, Limit, Scene, Stage, model};
+use super::{File, Limit, Scene, Stage, model, scene_list};
 use crate::engine::Raised;
 use crate::maps;
 
@@ -13,107 +13,26 @@ const WHOLE: [f32; 4] = [0.0, 0.0, 1.0, 1.0];
 
 /// The scenes of this module.
 pub(super) fn scenes() -> Vec<Scene> {
-    vec![
-        Scene {
-            files: || board().files(),
-            quick: true,
-            ..Scene::new(
-                "first-look",
-                "Pictures, text and a board of plain surfaces.",
-                first_look,
-            )
-        },
-        Scene {
-            files: || script(pictures::PICTURES),
-            quick: true,
-            ..Scene::new(
-                "2d-pictures",
-                "DrawStretchPic and SetColor.",
-                pictures::pictures,
-            )
-        },
-        Scene {
-            limit: Limit {
-                ssim: 0.9999,
-                ..Limit::SAME
-            },
-            quick: true,
-            ..Scene::new(
-                "2d-between",
-                "Pictures whose edges run through centres of pixels, or near them.",
-                pictures::between,
-            )
-        },
-        Scene {
-            quick: true,
-            ..Scene::new(
-                "2d-raw",
-                "DrawStretchRaw and UploadCinematic.",
-                pictures::raw,
-            )
-        },
-        Scene {
-            files: pictures::fonts,
-            ..Scene::new("2d-font", "RegisterFont and its glyphs.", pictures::font)
-        },
-        Scene {
-            files: answers::registered,
-            quick: true,
-            ..Scene::new("register", "What registering answers.", answers::register)
-        },
-        Scene {
-            files: || answers::remapped().files(),
-            quick: true,
-            ..Scene::new(
-                "remap",
-                "RemapShader on surfaces, entities, pictures.",
-                answers::remap,
-            )
-        },
-        Scene {
-            files: || {
-                let mut files = maps::files();
-                files.extend(model::files());
-                files
-            },
-            quick: true,
-            ..Scene::new(
-                "queries",
-                "Answers about the map and models.",
-                answers::queries,
-            )
-        },
-        Scene {
-            files: || answers::marked().files(),
-            ..Scene::new("marks", "Marks where the map takes them.", answers::marks)
-        },
-        Scene {
-            files: || answers::marked().files(),
-            cvars: &[("r_marksOnTriangleMeshes", "1")],
-            ..Scene::new(
-                "marks-meshes",
-                "Marks on triangle meshes, too.",
-                answers::marks,
-            )
-        },
-        Scene {
-            files: || board().files(),
-            quick: true,
-            ..Scene::new(
-                "views",
-                "Several views and pictures in a frame.",
-                views::views,
-            )
-        },
-        Scene {
-            files: || board().files(),
-            ..Scene::new(
-                "captures",
-                "TakeVideoFrame, screenshots, level shots.",
-                views::captures,
-            )
-        },
-    ]
+    scene_list! {
+        "first-look": "Pictures, text and a board of plain surfaces.",
+            calls(first_look), files: || board().files(), quick: true;
+        "2d-pictures": "DrawStretchPic and SetColor.",
+            calls(pictures::pictures), files: || script(pictures::PICTURES), quick: true;
+        "2d-between": "Pictures whose edges run through centres of pixels, or near them.",
+            calls(pictures::between), limit: Limit { ssim: 0.9999, ..Limit::SAME }, quick: true;
+        "2d-raw": "DrawStretchRaw and UploadCinematic.", calls(pictures::raw), quick: true;
+        "2d-font": "RegisterFont and its glyphs.", calls(pictures::font), files: pictures::fonts;
+        "register": "What registering answers.", calls(answers::register), files: answers::registered, quick: true;
+        "remap": "RemapShader on surfaces, entities, pictures.",
+            calls(answers::remap), files: || answers::remapped().files(), quick: true;
+        "queries": "Answers about the map and models.",
+            calls(answers::queries), files: || [maps::files(), model::files()].concat(), quick: true;
+        "marks": "Marks where the map takes them.", calls(answers::marks), files: || answers::marked().files();
+        "marks-meshes": "Marks on triangle meshes, too.",
+            calls(answers::marks), files: || answers::marked().files(), cvars: &[("r_marksOnTriangleMeshes", "1")];
+        "views": "Several views and pictures in a frame.", calls(views::views), files: || board().files(), quick: true;
+        "captures": "TakeVideoFrame, screenshots, level shots.", calls(views::captures), files: || board().files();
+    }
 }
 
 fn script(text: &str) -> Vec<File> {

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::super::Stage;
 use super::super::board::MAP;
-use super::{NO_WORLD_MODEL, keep, sprite, square, tube_at};
+use super::{NO_WORLD_MODEL, sprite, square, tube_at};
 use crate::engine::abi::{polyVert_t, refEntity_t};
 use crate::engine::{Raised, View};
 
@@ -80,9 +80,9 @@ pub(super) fn order(stage: &mut Stage) -> Result<(), Raised> {
         });
     }
     all.push(tube_at(stage, Vec3::new(0.0, 10.0, 0.0))?);
-    keep(stage, "numbers", &view, &all)?;
+    stage.keep_entities("numbers", &view, &all)?;
     all.reverse();
-    keep(stage, "reversed", &view, &all)?;
+    stage.keep_entities("reversed", &view, &all)?;
     let half = View {
         width: view.width / 2,
         ..view
@@ -131,10 +131,10 @@ pub(super) fn values(stage: &mut Stage) -> Result<(), Raised> {
             ..tube_at(stage, Vec3::new(0.0, y, 0.0))?
         });
     }
-    keep(stage, "values", &view, &all)?;
+    stage.keep_entities("values", &view, &all)?;
     stage.set_time(777);
     let view = stage.view(Vec3::new(-110.0, 0.0, 10.0), 0.0);
-    keep(stage, "later", &view, &all)
+    stage.keep_entities("later", &view, &all)
 }
 
 pub(super) fn bad(stage: &mut Stage) -> Result<(), Raised> {
@@ -146,8 +146,7 @@ pub(super) fn bad(stage: &mut Stage) -> Result<(), Raised> {
         entity.origin[axis] = f32::NAN;
         entity
     });
-    keep(
-        stage,
+    stage.keep_entities(
         "nowhere",
         &view,
         &[nowhere[0], good, nowhere[1], nowhere[2]],

@@ -5,95 +5,37 @@ mod shapes;
 mod surroundings;
 
 use glam::Vec3;
-use q3bsp::builder::MapBuilder;
 
-use super::board::{Board, Shape};
+use super::board::{Board, screen};
 use super::models::{model_files, turned};
-use super::{File, Limit, Scene, Stage};
+use super::{File, Limit, Scene, Stage, scene_list};
 use crate::engine::abi::{polyVert_t, refEntity_t};
 use crate::engine::{Raised, View};
 
 /// The scenes of this module.
 pub(super) fn scenes() -> Vec<Scene> {
-    let scene = |name, about, files, play| Scene {
-        files,
-        ..Scene::new(name, about, play)
-    };
-    vec![
-        Scene {
-            quick: true,
-            ..scene(
-                "entities-shapes",
-                "Sprites, beams, rails, bolts and the axes of missing models.",
-                plain_files,
-                shapes::shapes,
-            )
-        },
-        Scene {
-            // of the bolt's quads one is seen exactly from its edge: rounding decides which pixels it has
-            limit: Limit {
-                ssim: 0.99,
-                ..Limit::SAME
-            },
-            ..scene(
-                "entities-rails",
-                "Rails and bolts from the side, from their end, at other widths and lengths.",
-                plain_files,
-                shapes::rails,
-            )
-        },
-        scene(
-            "entities-flags",
-            "Depth hack, and what is seen in a mirror alone or everywhere but there.",
-            mirror_files,
-            shapes::flags,
-        ),
-        Scene {
-            quick: true,
-            ..scene(
-                "entities-light",
-                "The light grid, lights of the game, the light of views without a world.",
-                plain_files,
-                surroundings::light,
-            )
-        },
-        scene(
-            "entities-brushes",
-            "Brush models: placed, turned, lit, with materials that want an entity's light.",
-            brush_files,
-            surroundings::brushes,
-        ),
-        scene(
-            "entities-fog",
-            "Models, sprites and polygons inside, before and behind fog.",
-            fog_files,
-            surroundings::fog,
-        ),
-        scene(
-            "entities-polys",
-            "Polygons of one call and of many, their colours and their order.",
-            plain_files,
-            lists::polys,
-        ),
-        scene(
-            "entities-order",
-            "Translucent entities in the order of their numbers and shaders, several scenes in a frame.",
-            plain_files,
-            lists::order,
-        ),
-        scene(
-            "entities-values",
-            "Colour, texture offset and time of an entity in its material.",
-            plain_files,
-            lists::values,
-        ),
-        scene(
-            "entities-bad",
-            "Types that do not exist, places that are no place.",
-            plain_files,
-            lists::bad,
-        ),
-    ]
+    scene_list! {
+        "entities-shapes": "Sprites, beams, rails, bolts and the axes of missing models.",
+            calls(shapes::shapes), files: plain_files, quick: true;
+        // of the bolt's quads one is seen exactly from its edge: rounding decides which pixels it has
+        "entities-rails": "Rails and bolts from the side, from their end, at other widths and lengths.",
+            calls(shapes::rails), files: plain_files, limit: Limit { ssim: 0.99, ..Limit::SAME };
+        "entities-flags": "Depth hack, and what is seen in a mirror alone or everywhere but there.",
+            calls(shapes::flags), files: mirror_files;
+        "entities-light": "The light grid, lights of the game, the light of views without a world.",
+            calls(surroundings::light), files: plain_files, quick: true;
+        "entities-brushes": "Brush models: placed, turned, lit, with materials that want an entity's light.",
+            calls(surroundings::brushes), files: brush_files;
+        "entities-fog": "Models, sprites and polygons inside, before and behind fog.",
+            calls(surroundings::fog), files: fog_files;
+        "entities-polys": "Polygons of one call and of many, their colours and their order.",
+            calls(lists::polys), files: plain_files;
+        "entities-order": "Translucent entities in the order of their numbers and shaders, several scenes in a frame.",
+            calls(lists::order), files: plain_files;
+        "entities-values": "Colour, texture offset and time of an entity in its material.",
+            calls(lists::values), files: plain_files;
+        "entities-bad": "Types that do not exist, places that are no place.", calls(lists::bad), files: plain_files;
+    }
 }
 
 const SPRITE: i32 = 2;
@@ -188,10 +130,7 @@ e/mirror
 ";
 
 fn board() -> Board {
-    Board {
-        script: SCRIPT.to_string(),
-        ..Board::new(4, Shape::Face, [""; 0])
-    }
+    Board::empty(SCRIPT)
 }
 
 fn with_models(mut files: Vec<File>) -> Vec<File> {
@@ -203,22 +142,10 @@ fn plain_files() -> Vec<File> {
     with_models(board().files())
 }
 
-/// A quad that faces back towards the camera, `size` units to each side.
-fn add_screen(map: &mut MapBuilder, shader: q3bsp::ShaderId, center: Vec3, size: f32) {
-    let corner = |y: f32, z: f32| center + Vec3::new(0.0, y * size, z * size);
-    let corners = [
-        corner(1.0, 1.0),
-        corner(-1.0, 1.0),
-        corner(-1.0, -1.0),
-        corner(1.0, -1.0),
-    ];
-    map.add_quad(shader, corners);
-}
-
 fn mirror_files() -> Vec<File> {
     let mut map = board().map();
     let mirror = map.add_shader("e/mirror", 0, 1);
-    add_screen(&mut map, mirror, Vec3::new(36.0, 0.0, 0.0), 64.0);
+    map.add_quad(mirror, screen(Vec3::X * 36.0, 64.0, 64.0));
     with_models(board().files_with(map))
 }
 
@@ -271,7 +198,7 @@ fn sprite(at: Vec3, radius: f32, shader: i32) -> refEntity_t {
     }
 }
 
-fn tube_at(stage: &mut Stage, at: Vec3) -> Result<refEntity_t, Raised> {
+pub(super) fn tube_at(stage: &mut Stage, at: Vec3) -> Result<refEntity_t, Raised> {
     Ok(refEntity_t {
         hModel: stage.register_model("m/key.md3")?,
         origin: at.to_array(),
@@ -279,12 +206,6 @@ fn tube_at(stage: &mut Stage, at: Vec3) -> Result<refEntity_t, Raised> {
         frame: 1,
         oldframe: 1,
         ..refEntity_t::default()
-    })
-}
-
-fn keep(stage: &mut Stage, name: &str, view: &View, all: &[refEntity_t]) -> Result<(), Raised> {
-    stage.keep_view(name, view, |e| {
-        all.iter().try_for_each(|entity| e.add_entity(entity))
     })
 }
 

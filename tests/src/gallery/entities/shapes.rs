@@ -7,7 +7,7 @@ use super::super::board::MAP;
 use super::super::models::turned;
 use super::{
     BEAM, CROSSHAIR, DEPTH_HACK, FIRST_PERSON, LIGHTNING, MIN_LIGHT, PORTAL_SURFACE, RAIL_CORE,
-    RAIL_RINGS, THIRD_PERSON, askew, keep, line, sprite, tube_at,
+    RAIL_RINGS, THIRD_PERSON, askew, line, sprite, tube_at,
 };
 use crate::engine::Raised;
 use crate::engine::abi::refEntity_t;
@@ -30,7 +30,7 @@ pub(super) fn shapes(stage: &mut Stage) -> Result<(), Raised> {
         },
         sprite(Vec3::new(0.0, 0.0, 40.0), 10.0, 0),
     ];
-    keep(stage, "sprites", &view, &sprites)?;
+    stage.keep_entities("sprites", &view, &sprites)?;
     // without a shader that is drawn late the world is drawn over them
     let beams = [
         line(BEAM, Vec3::new(0.0, 0.0, 50.0), Vec3::ZERO),
@@ -45,7 +45,7 @@ pub(super) fn shapes(stage: &mut Stage) -> Result<(), Raised> {
             ..beam
         })
         .collect();
-    keep(stage, "beams", &view, &beams)?;
+    stage.keep_entities("beams", &view, &beams)?;
     for (name, kind) in [
         ("rail-core", RAIL_CORE),
         ("rail-rings", RAIL_RINGS),
@@ -55,7 +55,7 @@ pub(super) fn shapes(stage: &mut Stage) -> Result<(), Raised> {
             customShader: add,
             ..line(kind, left, right)
         };
-        keep(stage, name, &view, &[entity])?;
+        stage.keep_entities(name, &view, &[entity])?;
     }
     let axes = [
         refEntity_t::default(),
@@ -73,7 +73,7 @@ pub(super) fn shapes(stage: &mut Stage) -> Result<(), Raised> {
             ..refEntity_t::default()
         },
     ];
-    keep(stage, "axes", &view, &axes)
+    stage.keep_entities("axes", &view, &axes)
 }
 
 pub(super) fn rails(stage: &mut Stage) -> Result<(), Raised> {
@@ -106,7 +106,7 @@ pub(super) fn rails(stage: &mut Stage) -> Result<(), Raised> {
             customShader: add,
             ..entity
         });
-        keep(stage, name, &view, &all)?;
+        stage.keep_entities(name, &view, &all)?;
     }
     // from behind its start, so that some of it lies behind the eye
     let view = stage.view(Vec3::new(-20.0, 100.0, -30.0), -80.0);
@@ -114,7 +114,7 @@ pub(super) fn rails(stage: &mut Stage) -> Result<(), Raised> {
         customShader: add,
         ..line(kind, left, right)
     });
-    keep(stage, "along", &view, &all)
+    stage.keep_entities("along", &view, &all)
 }
 
 pub(super) fn flags(stage: &mut Stage) -> Result<(), Raised> {
@@ -159,7 +159,7 @@ pub(super) fn flags(stage: &mut Stage) -> Result<(), Raised> {
     ] {
         let mut scene = vec![mirror];
         scene.extend(all.map(|entity| refEntity_t { renderfx, ..entity }));
-        keep(stage, name, &view, &scene)?;
+        stage.keep_entities(name, &view, &scene)?;
     }
     // behind the wall
     let behind = |at: &mut refEntity_t| at.origin[0] += 100.0;
@@ -170,7 +170,7 @@ pub(super) fn flags(stage: &mut Stage) -> Result<(), Raised> {
         scene.iter_mut().for_each(behind);
         // without it the mirror would show what it showed before
         scene.push(mirror);
-        keep(stage, name, &view, &scene)?;
+        stage.keep_entities(name, &view, &scene)?;
     }
     Ok(())
 }

@@ -7,7 +7,7 @@ use super::super::board::MAP;
 use super::super::models::{KINDS, turned};
 use super::{
     CROSSHAIR, DEPTH_HACK, HYPERSPACE, LIGHTING_ORIGIN, NO_WORLD_MODEL, RAIL_CORE, THIRD_PERSON,
-    keep, line, sprite, square, tube_at,
+    line, sprite, square, tube_at,
 };
 use crate::engine::Raised;
 use crate::engine::abi::refEntity_t;
@@ -25,7 +25,7 @@ pub(super) fn light(stage: &mut Stage) -> Result<(), Raised> {
             ..tube_at(stage, Vec3::new(0.0, y, z))?
         });
     }
-    keep(stage, "grid", &view, &row)?;
+    stage.keep_entities("grid", &view, &row)?;
     let lights = [
         (
             Vec3::new(-30.0, 60.0, 10.0),
@@ -59,7 +59,7 @@ pub(super) fn light(stage: &mut Stage) -> Result<(), Raised> {
             ..*entity
         })
         .collect();
-    keep(stage, "elsewhere", &view, &elsewhere)?;
+    stage.keep_entities("elsewhere", &view, &elsewhere)?;
     let outside: Vec<_> = row
         .iter()
         .map(|entity| refEntity_t {
@@ -68,7 +68,7 @@ pub(super) fn light(stage: &mut Stage) -> Result<(), Raised> {
             ..*entity
         })
         .collect();
-    keep(stage, "outside", &view, &outside)?;
+    stage.keep_entities("outside", &view, &outside)?;
     for (name, flags) in [
         ("no-world", NO_WORLD_MODEL),
         ("hyperspace", NO_WORLD_MODEL | HYPERSPACE),
@@ -85,7 +85,7 @@ pub(super) fn light(stage: &mut Stage) -> Result<(), Raised> {
     }
     stage.set("r_ambientScale", "0.3");
     stage.set("r_directedScale", "1.7");
-    keep(stage, "scaled", &view, &row)?;
+    stage.keep_entities("scaled", &view, &row)?;
     for (number, at) in [
         Vec3::ZERO,
         Vec3::new(31.0, -77.0, 12.0),
@@ -119,7 +119,7 @@ pub(super) fn brushes(stage: &mut Stage) -> Result<(), Raised> {
             ..refEntity_t::default()
         });
     }
-    keep(stage, "placed", &view, &all)?;
+    stage.keep_entities("placed", &view, &all)?;
     stage.keep_view("lights", &view, |e| {
         e.add_light(Vec3::new(-40.0, 40.0, 10.0), 90.0, Vec3::new(1.0, 0.5, 0.2))?;
         e.add_light(
@@ -137,7 +137,7 @@ pub(super) fn brushes(stage: &mut Stage) -> Result<(), Raised> {
                 ..*entity
             })
             .collect();
-        keep(stage, name, &view, &flagged)?;
+        stage.keep_entities(name, &view, &flagged)?;
     }
     Ok(())
 }
@@ -183,8 +183,8 @@ pub(super) fn fog(stage: &mut Stage) -> Result<(), Raised> {
     }
     for (name, height) in [("above", 40.0), ("inside", -40.0)] {
         let view = stage.view(Vec3::new(-150.0, 0.0, height), 0.0);
-        keep(stage, &format!("{name}-kinds"), &view, &kinds)?;
-        keep(stage, name, &view, &all)?;
+        stage.keep_entities(&format!("{name}-kinds"), &view, &kinds)?;
+        stage.keep_entities(name, &view, &all)?;
         stage.keep_view(&format!("{name}-polys"), &view, |e| {
             for step in 0..6u8 {
                 let step = f32::from(step);

@@ -5,79 +5,31 @@ mod placed;
 
 use glam::Vec3;
 
-use super::board::{Board, MAP, Shape};
-use super::{File, Scene, Stage, tube};
-use crate::engine::Raised;
+use super::board::{Board, MAP};
+use super::{File, Scene, Stage, scene_list, tube};
 use crate::engine::abi::refEntity_t;
+use crate::engine::{Raised, View};
 
 /// The scenes of this module.
 pub(super) fn scenes() -> Vec<Scene> {
-    let scene = |name, about, play| Scene {
-        files,
-        ..Scene::new(name, about, play)
-    };
-    vec![
-        Scene {
-            quick: true,
-            ..scene(
-                "models-kinds",
-                "A tube as MD3, MDR, compressed MDR and IQM, in frames and between them.",
-                kinds,
-            )
-        },
-        scene(
-            "models-odd",
-            "An IQM without poses, and one whose joints are bound unevenly.",
-            odd,
-        ),
-        scene(
-            "models-surfaces",
-            "Skins, skin numbers, the entity's own shader, colours of vertices, on every kind of model.",
-            surfaces,
-        ),
-        scene(
-            "models-frames",
-            "Frames that do not exist, wrapped ones, axes that are not of length 1 or not square.",
-            frames,
-        ),
-        scene(
-            "models-lods",
-            "Levels of detail by distance, by r_lodbias and r_lodscale.",
-            levels,
-        ),
-        Scene {
-            cvars: &[("cg_shadows", "2"), ("r_stencilbits", "8")],
-            ..scene(
-                "models-volumes",
-                "Stencil shadows of every kind of model, and of those that ask for none.",
-                placed::shadows,
-            )
-        },
-        Scene {
-            cvars: &[("cg_shadows", "3")],
-            ..scene(
-                "models-planes",
-                "Planar shadows of every kind of model, seen or not.",
-                placed::shadows,
-            )
-        },
-        Scene {
-            packs: true,
-            ..scene(
-                "models-player",
-                "A player of the game put together by tags, in a map and in a view without one.",
-                placed::player,
-            )
-        },
-        Scene {
-            quick: true,
-            ..scene(
-                "models-answers",
-                "Tags between frames and bounds of every kind of model.",
-                answers::answers,
-            )
-        },
-    ]
+    scene_list! {
+        "models-kinds": "A tube as MD3, MDR, compressed MDR and IQM, in frames and between them.",
+            calls(kinds), files: files, quick: true;
+        "models-odd": "An IQM without poses, and one whose joints are bound unevenly.", calls(odd), files: files;
+        "models-surfaces": "Skins, skin numbers, the entity's own shader, colours of vertices, on every kind of model.",
+            calls(surfaces), files: files;
+        "models-frames": "Frames that do not exist, wrapped ones, axes that are not of length 1 or not square.",
+            calls(frames), files: files;
+        "models-lods": "Levels of detail by distance, by r_lodbias and r_lodscale.", calls(levels), files: files;
+        "models-volumes": "Stencil shadows of every kind of model, and of those that ask for none.",
+            calls(placed::shadows), files: files, cvars: &[("cg_shadows", "2"), ("r_stencilbits", "8")];
+        "models-planes": "Planar shadows of every kind of model, seen or not.",
+            calls(placed::shadows), files: files, cvars: &[("cg_shadows", "3")];
+        "models-player": "A player of the game put together by tags, in a map and in a view without one.",
+            calls(placed::player), files: files, packs: true;
+        "models-answers": "Tags between frames and bounds of every kind of model.",
+            calls(answers::answers), files: files, quick: true;
+    }
 }
 
 /// Every kind of model under the name that its file has.
@@ -127,10 +79,7 @@ tube/glow
 ";
 
 fn board() -> Board {
-    Board {
-        script: SCRIPT.to_string(),
-        ..Board::new(4, Shape::Face, [""; 0])
-    }
+    Board::empty(SCRIPT)
 }
 
 fn files() -> Vec<File> {
@@ -173,6 +122,27 @@ pub(super) fn turned(yaw: f32) -> [[f32; 3]; 3] {
     [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]
 }
 
+/// Keeps a row of models of the kinds that are `shown`, as entities like `entity`.
+fn keep_kinds(
+    stage: &mut Stage,
+    name: &str,
+    view: &View,
+    entity: refEntity_t,
+    shown: impl Fn(&str) -> bool,
+) -> Result<(), Raised> {
+    let mut all = Vec::new();
+    for (at, kind) in KINDS.into_iter().enumerate() {
+        if shown(kind) {
+            all.push(refEntity_t {
+                hModel: stage.register_model(kind)?,
+                origin: row(at, KINDS.len()).to_array(),
+                ..entity
+            });
+        }
+    }
+    stage.keep_entities(name, view, &all)
+}
+
 fn kinds(stage: &mut Stage) -> Result<(), Raised> {
     stage.start_map(MAP)?;
     let view = stage.view(Vec3::new(-110.0, 0.0, 10.0), 0.0);
@@ -183,22 +153,14 @@ fn kinds(stage: &mut Stage) -> Result<(), Raised> {
         ("between", 1, 0, 0.4),
         ("back", 1, 2, 0.75),
     ] {
-        let mut all = Vec::new();
-        for (at, kind) in KINDS.into_iter().enumerate() {
-            let mut entity = refEntity_t {
-                hModel: stage.register_model(kind)?,
-                frame,
-                oldframe,
-                backlerp,
-                axis: turned(25.0),
-                ..refEntity_t::default()
-            };
-            place(&mut entity, row(at, KINDS.len()));
-            all.push(entity);
-        }
-        stage.keep_view(name, &view, |e| {
-            all.iter().try_for_each(|entity| e.add_entity(entity))
-        })?;
+        let entity = refEntity_t {
+            frame,
+            oldframe,
+            backlerp,
+            axis: turned(25.0),
+            ..refEntity_t::default()
+        };
+        keep_kinds(stage, name, &view, entity, |_| true)?;
     }
     Ok(())
 }
@@ -221,9 +183,7 @@ fn odd(stage: &mut Stage) -> Result<(), Raised> {
         place(&mut entity, row(at, models.len()));
         all.push(entity);
     }
-    stage.keep_view("row", &view, |e| {
-        all.iter().try_for_each(|entity| e.add_entity(entity))
-    })
+    stage.keep_entities("row", &view, &all)
 }
 
 fn surfaces(stage: &mut Stage) -> Result<(), Raised> {
@@ -245,82 +205,26 @@ fn surfaces(stage: &mut Stage) -> Result<(), Raised> {
         "skins",
         format!("{} {} {} {missing}", skin > 0, half > 0, single > 0),
     );
+    let skinned = |skin, number, shader| refEntity_t {
+        customSkin: skin,
+        skinNum: number,
+        customShader: shader,
+        ..plain
+    };
     let variants = [
-        (
-            "skin",
-            refEntity_t {
-                customSkin: skin,
-                ..plain
-            },
-        ),
-        (
-            "half",
-            refEntity_t {
-                customSkin: half,
-                ..plain
-            },
-        ),
-        (
-            "single",
-            refEntity_t {
-                customSkin: single,
-                ..plain
-            },
-        ),
-        (
-            "bad-skin",
-            refEntity_t {
-                customSkin: 999,
-                ..plain
-            },
-        ),
-        (
-            "number1",
-            refEntity_t {
-                skinNum: 1,
-                ..plain
-            },
-        ),
-        (
-            "number5",
-            refEntity_t {
-                skinNum: 5,
-                ..plain
-            },
-        ),
-        (
-            "shader",
-            refEntity_t {
-                customShader: vertex,
-                customSkin: skin,
-                ..plain
-            },
-        ),
-        (
-            "bad-shader",
-            refEntity_t {
-                customShader: 99_999,
-                ..plain
-            },
-        ),
+        ("skin", skinned(skin, 0, 0)),
+        ("half", skinned(half, 0, 0)),
+        ("single", skinned(single, 0, 0)),
+        ("bad-skin", skinned(999, 0, 0)),
+        ("number1", skinned(0, 1, 0)),
+        ("number5", skinned(0, 5, 0)),
+        ("shader", skinned(skin, 0, vertex)),
+        ("bad-shader", skinned(0, 0, 99_999)),
     ];
     for (name, variant) in variants {
-        let mut all = Vec::new();
-        for (at, kind) in KINDS.into_iter().enumerate() {
-            // vertices of the other kinds have what colours the reference drew last
-            if name == "shader" && !kind.ends_with("iqm") {
-                continue;
-            }
-            let mut entity = refEntity_t {
-                hModel: stage.register_model(kind)?,
-                ..variant
-            };
-            place(&mut entity, row(at, KINDS.len()));
-            all.push(entity);
-        }
-        stage.keep_view(name, &view, |e| {
-            all.iter().try_for_each(|entity| e.add_entity(entity))
-        })?;
+        // vertices of the other kinds have what colours the reference drew last
+        let shown = |kind: &str| name != "shader" || kind.ends_with("iqm");
+        keep_kinds(stage, name, &view, variant, shown)?;
     }
     Ok(())
 }
@@ -340,69 +244,24 @@ fn frames(stage: &mut Stage) -> Result<(), Raised> {
         renderfx,
         ..plain
     };
-    let scaled = |forward: f32, left: f32, up: f32| {
-        let [f, l, u] = plain.axis;
-        [(f, forward), (l, left), (u, up)].map(|(axis, scale)| axis.map(|v| v * scale))
+    let scaled = |scale: [f32; 3], announced, number| refEntity_t {
+        axis: std::array::from_fn(|i| plain.axis[i].map(|v| v * scale[i])),
+        nonNormalizedAxes: announced,
+        skinNum: number,
+        ..plain
     };
     let variants = [
         ("beyond", framed(7, 1, 0)),
         ("beyond-old", framed(1, 3, 0)),
         ("wrapped", framed(7, 5, WRAP_FRAMES)),
-        (
-            "scaled",
-            refEntity_t {
-                axis: scaled(1.3, 1.3, 1.3),
-                nonNormalizedAxes: 1,
-                skinNum: 2,
-                ..plain
-            },
-        ),
-        (
-            "squeezed",
-            refEntity_t {
-                axis: scaled(1.0, 0.5, 1.2),
-                nonNormalizedAxes: 1,
-                skinNum: 2,
-                ..plain
-            },
-        ),
-        (
-            "unannounced",
-            refEntity_t {
-                axis: scaled(1.4, 1.4, 0.8),
-                skinNum: 2,
-                ..plain
-            },
-        ),
-        (
-            "mirrored",
-            refEntity_t {
-                axis: scaled(1.0, -1.0, 1.0),
-                ..plain
-            },
-        ),
-        (
-            "flat",
-            refEntity_t {
-                axis: scaled(0.0, 1.0, 1.0),
-                nonNormalizedAxes: 1,
-                ..plain
-            },
-        ),
+        ("scaled", scaled([1.3, 1.3, 1.3], 1, 2)),
+        ("squeezed", scaled([1.0, 0.5, 1.2], 1, 2)),
+        ("unannounced", scaled([1.4, 1.4, 0.8], 0, 2)),
+        ("mirrored", scaled([1.0, -1.0, 1.0], 0, 0)),
+        ("flat", scaled([0.0, 1.0, 1.0], 1, 0)),
     ];
     for (name, variant) in variants {
-        let mut all = Vec::new();
-        for (at, kind) in KINDS.into_iter().enumerate() {
-            let mut entity = refEntity_t {
-                hModel: stage.register_model(kind)?,
-                ..variant
-            };
-            place(&mut entity, row(at, KINDS.len()));
-            all.push(entity);
-        }
-        stage.keep_view(name, &view, |e| {
-            all.iter().try_for_each(|entity| e.add_entity(entity))
-        })?;
+        keep_kinds(stage, name, &view, variant, |_| true)?;
     }
     Ok(())
 }

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::super::Stage;
 use super::super::board::MAP;
-use super::{KINDS, place, row, turned};
+use super::{keep_kinds, place, turned};
 use crate::engine::Raised;
 use crate::engine::abi::refEntity_t;
 
@@ -58,9 +58,7 @@ pub(super) fn player(stage: &mut Stage) -> Result<(), Raised> {
     let mut view = stage.view(Vec3::new(-60.0, 0.0, 8.0), 0.0);
     for (name, flags) in [("world", 0), ("no-world", NO_WORLD_MODEL)] {
         view.flags = flags;
-        stage.keep_view(name, &view, |e| {
-            all.iter().try_for_each(|entity| e.add_entity(entity))
-        })?;
+        stage.keep_entities(name, &view, &all)?;
     }
     Ok(())
 }
@@ -78,24 +76,16 @@ pub(super) fn shadows(stage: &mut Stage) -> Result<(), Raised> {
         ("plane-none", SHADOW_PLANE | NO_SHADOW),
         ("plane-third", SHADOW_PLANE | THIRD_PERSON),
     ] {
-        let mut all = Vec::new();
-        for (at, kind) in KINDS.into_iter().enumerate() {
-            let mut entity = refEntity_t {
-                hModel: stage.register_model(kind)?,
-                frame: 1,
-                oldframe: 0,
-                backlerp: 0.3,
-                axis: turned(25.0),
-                renderfx,
-                shadowPlane: -40.0,
-                ..refEntity_t::default()
-            };
-            place(&mut entity, row(at, KINDS.len()));
-            all.push(entity);
-        }
-        stage.keep_view(name, &view, |e| {
-            all.iter().try_for_each(|entity| e.add_entity(entity))
-        })?;
+        let entity = refEntity_t {
+            frame: 1,
+            oldframe: 0,
+            backlerp: 0.3,
+            axis: turned(25.0),
+            renderfx,
+            shadowPlane: -40.0,
+            ..refEntity_t::default()
+        };
+        keep_kinds(stage, name, &view, entity, |_| true)?;
     }
     Ok(())
 }
