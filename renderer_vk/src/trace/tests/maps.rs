@@ -104,9 +104,7 @@ impl Game {
             ..camera(world)
         };
         let view = Scene::default()
-            .gather(Some(world), assets, settings, &def, TRACED)
-            .expect("view")
-            .pop()
+            .gather_traced(&GatherInput::new(Some(world), assets, settings), &def)
             .expect("view");
         let usage = ImageUsage::STORAGE | ImageUsage::COLOR;
         let desc = ImageDesc::new("picture", width, height, Format::Rgba8, usage);
