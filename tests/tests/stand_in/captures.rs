@@ -159,7 +159,7 @@ fn a_still_picture_is_made_beside_the_game() {
     engine.take_messages();
     frame(&mut engine, "rt_screenshot 4", 30.0);
     assert!(
-        said(&mut engine).contains("r_rt 0"),
+        said(&mut engine).contains("set r_rt 1"),
         "it needs the traced look"
     );
     engine.set("r_rt", "1");
@@ -234,14 +234,10 @@ fn costs_are_told_in_lines_and_as_json() {
         assert!(lines.contains(part), "no {part} in {lines}");
     }
     let json = engine.read_file("stats/frame.json").expect("the file");
-    let json = String::from_utf8(json).unwrap();
-    let eye = json.lines().find(|l| l.contains("\"trace_primary_rays\""));
-    let eye = eye.expect("the pass");
-    let rays = eye
-        .split("\"rays\": ")
-        .nth(1)
-        .and_then(|t| t.split(',').next());
-    let rays: u64 = rays.and_then(|r| r.parse().ok()).expect("a number");
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    let passes = json["passes"].as_array().expect("a list");
+    let primary = passes.iter().find(|p| p["name"] == "trace_primary_rays");
+    let rays = primary.and_then(|p| p["rays"].as_u64()).expect("a number");
     assert!(rays >= 320 * 240, "{rays}");
     engine.assert_clean();
 }

@@ -376,7 +376,7 @@ fn lights_of_the_map_can_be_chosen_while_playing() {
         }
         shown.push(engine.picture(&view).unwrap());
         let said = text_of(&engine.take_messages());
-        fitted += said.matches("lights fitted").count();
+        fitted += said.matches("lights calibrated").count();
     }
     // each light is found once, and then put back
     assert_eq!(fitted, 1);
