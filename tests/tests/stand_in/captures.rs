@@ -191,7 +191,7 @@ fn a_still_picture_is_made_beside_the_game() {
     }
     let lines = said(&mut engine);
     assert!(
-        lines.contains("is being made") && lines.contains("of 16 samples"),
+        lines.contains("in progress") && lines.contains("of 16 samples"),
         "{lines}"
     );
     let file = engine
