@@ -219,46 +219,7 @@ impl StageArrays {
         out.tc_mod_first = count(self.tc_mods.len());
         out.tc_mod_count = count(stage.tc_mods.len());
         self.tc_mods.extend(stage.tc_mods.iter().map(tc_mod));
-        out.constant = [1.0; 4];
-        out.rgb_gen = match &stage.rgb_gen {
-            RgbGen::Identity => c::RGBGEN_IDENTITY,
-            RgbGen::IdentityLighting => c::RGBGEN_IDENTITY_LIGHTING,
-            RgbGen::Wave(function) => {
-                out.rgb_wave = wave(function);
-                c::RGBGEN_WAVE
-            }
-            RgbGen::Const(rgb) => {
-                let [r, g, b] = rgb.to_array();
-                out.constant = [r, g, b, 1.0];
-                c::RGBGEN_CONST
-            }
-            RgbGen::Entity => c::RGBGEN_ENTITY,
-            RgbGen::OneMinusEntity => c::RGBGEN_ONE_MINUS_ENTITY,
-            RgbGen::Vertex => c::RGBGEN_VERTEX,
-            RgbGen::ExactVertex => c::RGBGEN_EXACT_VERTEX,
-            RgbGen::OneMinusVertex => c::RGBGEN_ONE_MINUS_VERTEX,
-            RgbGen::LightingDiffuse => c::RGBGEN_LIGHTING_DIFFUSE,
-        };
-        out.alpha_gen = match &stage.alpha_gen {
-            AlphaGen::Identity => c::ALPHAGEN_IDENTITY,
-            AlphaGen::Const(alpha) => {
-                out.constant[3] = *alpha;
-                c::ALPHAGEN_CONST
-            }
-            AlphaGen::Wave(function) => {
-                out.alpha_wave = wave(function);
-                c::ALPHAGEN_WAVE
-            }
-            AlphaGen::Entity => c::ALPHAGEN_ENTITY,
-            AlphaGen::OneMinusEntity => c::ALPHAGEN_ONE_MINUS_ENTITY,
-            AlphaGen::Vertex => c::ALPHAGEN_VERTEX,
-            AlphaGen::OneMinusVertex => c::ALPHAGEN_ONE_MINUS_VERTEX,
-            AlphaGen::LightingSpecular => c::ALPHAGEN_LIGHTING_SPECULAR,
-            AlphaGen::Portal { range } => {
-                out.portal_range = *range;
-                c::ALPHAGEN_PORTAL
-            }
-        };
+        set_colors(&mut out, stage);
         out.alpha_func = alpha_func(stage.alpha_func);
         let (src, dst) = stage.blend.unwrap_or((BlendFactor::One, BlendFactor::Zero));
         out.blend_src = blend_factor(src);
@@ -385,4 +346,48 @@ impl VideoClients {
             .enumerate()
             .map(|(i, name)| (name.as_str(), FIRST_VIDEO_CLIENT + i))
     }
+}
+
+/// Sets how a stage makes colour and alpha.
+fn set_colors(out: &mut types::Stage, stage: &Stage) {
+    out.constant = [1.0; 4];
+    out.rgb_gen = match &stage.rgb_gen {
+        RgbGen::Identity => c::RGBGEN_IDENTITY,
+        RgbGen::IdentityLighting => c::RGBGEN_IDENTITY_LIGHTING,
+        RgbGen::Wave(function) => {
+            out.rgb_wave = wave(function);
+            c::RGBGEN_WAVE
+        }
+        RgbGen::Const(rgb) => {
+            let [r, g, b] = rgb.to_array();
+            out.constant = [r, g, b, 1.0];
+            c::RGBGEN_CONST
+        }
+        RgbGen::Entity => c::RGBGEN_ENTITY,
+        RgbGen::OneMinusEntity => c::RGBGEN_ONE_MINUS_ENTITY,
+        RgbGen::Vertex => c::RGBGEN_VERTEX,
+        RgbGen::ExactVertex => c::RGBGEN_EXACT_VERTEX,
+        RgbGen::OneMinusVertex => c::RGBGEN_ONE_MINUS_VERTEX,
+        RgbGen::LightingDiffuse => c::RGBGEN_LIGHTING_DIFFUSE,
+    };
+    out.alpha_gen = match &stage.alpha_gen {
+        AlphaGen::Identity => c::ALPHAGEN_IDENTITY,
+        AlphaGen::Const(alpha) => {
+            out.constant[3] = *alpha;
+            c::ALPHAGEN_CONST
+        }
+        AlphaGen::Wave(function) => {
+            out.alpha_wave = wave(function);
+            c::ALPHAGEN_WAVE
+        }
+        AlphaGen::Entity => c::ALPHAGEN_ENTITY,
+        AlphaGen::OneMinusEntity => c::ALPHAGEN_ONE_MINUS_ENTITY,
+        AlphaGen::Vertex => c::ALPHAGEN_VERTEX,
+        AlphaGen::OneMinusVertex => c::ALPHAGEN_ONE_MINUS_VERTEX,
+        AlphaGen::LightingSpecular => c::ALPHAGEN_LIGHTING_SPECULAR,
+        AlphaGen::Portal { range } => {
+            out.portal_range = *range;
+            c::ALPHAGEN_PORTAL
+        }
+    };
 }

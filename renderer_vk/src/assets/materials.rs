@@ -279,6 +279,18 @@ impl Materials {
         if self.get(index).defaulted { 0 } else { index }
     }
 
+    /// Reports a missing image. `place`: of the script that names it; menus and mods often request absent images, so that
+    /// only scripts cause a warning.
+    fn tell_missing(&self, name: &str, place: Option<&String>, image: &str) {
+        match place {
+            Some(place) => {
+                let fault = format!("{place}: image {image} is missing");
+                self.scripts.tell_fault(name, &fault);
+            }
+            None => log::debug!("{name}: no script and no image of that name"),
+        }
+    }
+
     /// Binds a definition to its images and appends it.
     fn add(
         &mut self,
@@ -317,13 +329,7 @@ impl Materials {
         let kept = pushed.count;
         let missing = missing.or(pushed.missing);
         if let Some(image) = missing {
-            // menus and mods often request absent images: only scripts cause a warning
-            if explicit {
-                let fault = format!("{place}: image {image} is missing");
-                self.scripts.tell_fault(name, &fault);
-            } else {
-                log::debug!("{name}: no script and no image of that name");
-            }
+            self.tell_missing(name, explicit.then_some(&place), &image);
             defaulted = true;
         }
         shader.stages.truncate(kept);

@@ -134,31 +134,7 @@ impl Bindless {
         };
         lock(&self.storages).capacity = info.max_storage_images;
         lock(&self.scenes).capacity = if abilities.acceleration { SCENES } else { 0 };
-        let bindings: Vec<_> = (0u32..)
-            .zip(&counts)
-            .map(|(binding, (kind, count))| {
-                vk::DescriptorSetLayoutBinding::default()
-                    .binding(binding)
-                    .descriptor_type(*kind)
-                    .descriptor_count(*count)
-                    .stage_flags(vk::ShaderStageFlags::ALL)
-            })
-            .collect();
-        let flags = vec![
-            vk::DescriptorBindingFlags::PARTIALLY_BOUND
-                | vk::DescriptorBindingFlags::UPDATE_AFTER_BIND
-                | vk::DescriptorBindingFlags::UPDATE_UNUSED_WHILE_PENDING;
-            bindings.len()
-        ];
-        let mut flags =
-            vk::DescriptorSetLayoutBindingFlagsCreateInfo::default().binding_flags(&flags);
-        let layout_info = vk::DescriptorSetLayoutCreateInfo::default()
-            .flags(vk::DescriptorSetLayoutCreateFlags::UPDATE_AFTER_BIND_POOL)
-            .bindings(&bindings)
-            .push_next(&mut flags);
-        // SAFETY: counts are within the device's update-after-bind limits; pointers live here.
-        self.set_layout = unsafe { raw.create_descriptor_set_layout(&layout_info, None) }
-            .context("vkCreateDescriptorSetLayout")?;
+        self.set_layout = set_layout(raw, &counts)?;
         let sizes: Vec<_> = counts
             .iter()
             .map(|(kind, count)| vk::DescriptorPoolSize {
@@ -375,4 +351,35 @@ impl Device {
         samplers.push((*desc, sampler));
         Ok(index)
     }
+}
+
+/// The layout of the set: arrays of so many descriptors of each kind, in the order of their bindings.
+fn set_layout(
+    raw: &ash::Device,
+    counts: &[(vk::DescriptorType, u32)],
+) -> Result<vk::DescriptorSetLayout, Error> {
+    let bindings: Vec<_> = (0u32..)
+        .zip(counts)
+        .map(|(binding, (kind, count))| {
+            vk::DescriptorSetLayoutBinding::default()
+                .binding(binding)
+                .descriptor_type(*kind)
+                .descriptor_count(*count)
+                .stage_flags(vk::ShaderStageFlags::ALL)
+        })
+        .collect();
+    let flags = vec![
+        vk::DescriptorBindingFlags::PARTIALLY_BOUND
+            | vk::DescriptorBindingFlags::UPDATE_AFTER_BIND
+            | vk::DescriptorBindingFlags::UPDATE_UNUSED_WHILE_PENDING;
+        bindings.len()
+    ];
+    let mut flags = vk::DescriptorSetLayoutBindingFlagsCreateInfo::default().binding_flags(&flags);
+    let layout_info = vk::DescriptorSetLayoutCreateInfo::default()
+        .flags(vk::DescriptorSetLayoutCreateFlags::UPDATE_AFTER_BIND_POOL)
+        .bindings(&bindings)
+        .push_next(&mut flags);
+    // SAFETY: counts are within the device's update-after-bind limits; pointers live here.
+    unsafe { raw.create_descriptor_set_layout(&layout_info, None) }
+        .context("vkCreateDescriptorSetLayout")
 }

@@ -161,6 +161,7 @@ pub(crate) fn choose(instance: &Instance, options: &DeviceOptions) -> Result<Cho
 }
 
 /// Makes the logical device with all features in `choice.abilities`.
+// Over 80 lines: one list of extensions and features; their structures must live until the call at the end.
 pub(crate) fn create_device(instance: &Instance, choice: &Choice) -> Result<ash::Device, Error> {
     let a = choice.abilities;
     let mut extensions = Vec::new();

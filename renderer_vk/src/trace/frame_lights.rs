@@ -32,6 +32,33 @@ struct FrameLights {
 const SEARCH_MARGIN: f32 = 2.0;
 
 impl FrameLights {
+    /// Uploads the lights for one frame. `clusters`: number of the map's clusters.
+    fn upload(
+        &self,
+        rec: &mut Recorder,
+        clusters: usize,
+        lights: &mut t::LightView,
+    ) -> Result<(), Error> {
+        let arena = rec.arena();
+        if !self.triangles.is_empty() {
+            let bounds: Vec<_> = self.triangles.iter().map(triangle_bounds).collect();
+            lights.triangles[1] = arena.push(&self.triangles)?;
+            lights.bounds[1] = arena.push(&bounds)?;
+        }
+        if !self.spheres.is_empty() {
+            let bounds: Vec<_> = self.spheres.iter().map(sphere_bounds).collect();
+            lights.spheres[1] = arena.push(&self.spheres)?;
+            lights.bounds[3] = arena.push(&bounds)?;
+        }
+        if !self.reach.is_empty() {
+            let (rows, entries) = self.rows(clusters);
+            lights.dynamic_rows = arena.push(&rows)?;
+            lights.dynamic_lights = arena.push(&entries)?;
+            lights.dynamic_row_count = count(rows.len());
+        }
+        Ok(())
+    }
+
     fn add_sphere(&mut self, light: t::SphereLight, sight: &Sight) {
         let margin = Vec3::splat(light.radius.max(SEARCH_MARGIN));
         let at = sight.touching(Aabb::of([light.origin]).grown(margin));
@@ -129,6 +156,32 @@ impl MapLights {
         view: &TracedScene,
         settings: &Settings,
     ) -> Result<t::LightView, Error> {
+        let frame = self.frame_lights(view, settings);
+        let mut lights = self.fixed();
+        frame.upload(rec, self.sight.count(), &mut lights)?;
+        if !settings.rt_cull_lights {
+            // without a tree every point uses the last row, which holds all lights
+            lights.node_count = 0;
+        }
+        lights.flags = if settings.rt_soft_shadows {
+            c::LIGHTS_SOFT
+        } else {
+            0
+        };
+        lights.selection = match settings.rt_light_selection {
+            _ if settings.rt_num_random_dl == 0 => c::SELECT_ALL,
+            LightSelection::Uniform => c::SELECT_UNIFORM,
+            LightSelection::Resampled => c::SELECT_RESAMPLED,
+        };
+        lights.samples = settings.rt_num_random_dl.max(1);
+        lights.candidates = settings.rt_candidates.max(1);
+        lights.scale = settings.rt_light_scale.max(0.0);
+        lights.ambient = self.ambient * lights.scale;
+        Ok(lights)
+    }
+
+    /// The lights that change from frame to frame: animated and moving lights of the map, and those of the game.
+    fn frame_lights(&self, view: &TracedScene, settings: &Settings) -> FrameLights {
         let scale = settings.rt_light_scale.max(0.0);
         // the engine's time, by which stages are animated
         let time = f64::from(view.time);
@@ -169,43 +222,7 @@ impl MapLights {
         if settings.rt_flashlight {
             frame.add_sphere(flashlight(&view.view, self.white), &self.sight);
         }
-        let mut lights = self.fixed();
-        let arena = rec.arena();
-        if !frame.triangles.is_empty() {
-            let bounds: Vec<_> = frame.triangles.iter().map(triangle_bounds).collect();
-            lights.triangles[1] = arena.push(&frame.triangles)?;
-            lights.bounds[1] = arena.push(&bounds)?;
-        }
-        if !frame.spheres.is_empty() {
-            let sphere_bounds: Vec<_> = frame.spheres.iter().map(sphere_bounds).collect();
-            lights.spheres[1] = arena.push(&frame.spheres)?;
-            lights.bounds[3] = arena.push(&sphere_bounds)?;
-        }
-        if !frame.reach.is_empty() {
-            let (rows, entries) = frame.rows(self.sight.count());
-            lights.dynamic_rows = arena.push(&rows)?;
-            lights.dynamic_lights = arena.push(&entries)?;
-            lights.dynamic_row_count = count(rows.len());
-        }
-        if !settings.rt_cull_lights {
-            // without a tree every point uses the last row, which holds all lights
-            lights.node_count = 0;
-        }
-        lights.flags = if settings.rt_soft_shadows {
-            c::LIGHTS_SOFT
-        } else {
-            0
-        };
-        lights.selection = match settings.rt_light_selection {
-            _ if settings.rt_num_random_dl == 0 => c::SELECT_ALL,
-            LightSelection::Uniform => c::SELECT_UNIFORM,
-            LightSelection::Resampled => c::SELECT_RESAMPLED,
-        };
-        lights.samples = settings.rt_num_random_dl.max(1);
-        lights.candidates = settings.rt_candidates.max(1);
-        lights.scale = scale;
-        lights.ambient = self.ambient * scale;
-        Ok(lights)
+        frame
     }
 }
 

@@ -1,7 +1,7 @@
 //! Acceleration structures of the map's constant geometry: one for each brush model and group of kinds, built once per
 //! map.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{Vec2, Vec3};
@@ -147,8 +147,12 @@ enum Portion {
 /// Surfaces of one structure, each with its drawn material.
 type Members<'a> = Vec<(&'a StaticSurface, u32, MaterialInfo, Portion)>;
 
-fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
-    let doubled = doubled(scene, materials);
+/// The surfaces of each structure, by BSP model and kind. `doubled`: first indices of triangles that lie in another's place.
+fn members<'a>(
+    scene: &'a StaticScene<'_>,
+    materials: &dyn MaterialTable,
+    doubled: &HashSet<usize>,
+) -> BTreeMap<(u32, Kind), Members<'a>> {
     let has_doubled = |surface: &StaticSurface| {
         let first = surface.first_index as usize;
         let firsts = (0..surface.index_count as usize).step_by(3);
@@ -174,6 +178,13 @@ fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
             }
         }
     }
+    sorted
+}
+
+/// The triangles of all structures, each with a range of them.
+fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
+    let doubled = doubled(scene, materials);
+    let sorted = members(scene, materials, &doubled);
     let mut grouped = Grouped {
         triangles: Vec::new(),
         groups: BTreeMap::new(),

@@ -304,15 +304,7 @@ impl ViewTracer {
             passes.run(Pass::FlareRays)?;
         }
         self.denoiser.reproject_gradients(passes)?;
-        if is_lit(settings) && samples_one_light(params) {
-            passes.run(Pass::SampleLights)?;
-            passes.run(Pass::SampledDirect)?;
-            if params.lights.sun_count > 0 {
-                passes.run(Pass::Suns)?;
-            }
-        } else {
-            passes.run(Pass::Direct)?;
-        }
+        light_directly(passes, settings, params)?;
         if facts.bounces {
             indirect::record(passes, settings)?;
         } else {
@@ -387,6 +379,23 @@ impl ViewTracer {
         self.accumulated = (key, before.saturating_add(1));
         before
     }
+}
+
+/// Records the passes of direct light.
+fn light_directly(
+    passes: &mut FramePasses<'_>,
+    settings: &Settings,
+    params: &TraceView,
+) -> Result<(), Error> {
+    if !is_lit(settings) || !samples_one_light(params) {
+        return passes.run(Pass::Direct);
+    }
+    passes.run(Pass::SampleLights)?;
+    passes.run(Pass::SampledDirect)?;
+    if params.lights.sun_count > 0 {
+        passes.run(Pass::Suns)?;
+    }
+    Ok(())
 }
 
 /// Whether each pixel samples a single light, in a pass of its own.
