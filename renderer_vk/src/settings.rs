@@ -95,7 +95,7 @@ settings! { variables {
     map_overbright_bits: u32 = "r_mapOverBrightBits", "2", LATCH, None, Frame, GoesOn, "Doublings that the map's lightmaps are meant to get in the classic look.";
     greyscale: f32 = "r_greyscale", "0", ARCHIVE | LATCH, kept(0.0, 1.0), Frame, GoesOn, "0 coloured to 1 grey: takes colour out of textures and light.";
     vertex_light: bool = "r_vertexLight", "0", ARCHIVE | LATCH, None, Frame, GoesOn, "1 lights the classic look by vertex colours instead of lightmaps.";
-    fullbright: bool = "r_fullbright", "0", LATCH | CHEAT, None, Frame, Restarts, "1 draws the classic look without lightmaps.";
+    fullbright: bool = "r_fullbright", "0", LATCH | CHEAT, None, Frame, Restarts, "1 draws the classic look without lightmaps, the traced look without light.";
     lightmap: i32 = "r_lightmap", "0", NONE, None, Frame, GoesOn, "1 shows lightmaps alone in the classic look; 2, when a map is loaded, as colours by brightness.";
     single_shader: bool = "r_singleShader", "0", LATCH | CHEAT, None, Frame, GoesOn, "1 shows the default material on every surface of the map but the sky.";
     subdivisions: f32 = "r_subdivisions", "4", ARCHIVE | LATCH, None, Frame, GoesOn, "Largest deviation of curved surfaces in units; smaller is smoother.";

@@ -6,7 +6,7 @@ use super::row::Kind;
 use super::value::{Given, Value, named, numbered};
 
 numbered! {
-    /// How a traced light sample selects its light from a cluster's list.
+    /// How a traced light sample selects its light from a cell's list.
     LightSelection {
         /// Resampled importance sampling among a few candidates.
         Resampled = 1,

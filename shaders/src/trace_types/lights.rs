@@ -85,7 +85,7 @@ pub struct LightSlot {
     pub chance: f32,
     /// The same of the alias.
     pub alias_chance: f32,
-    /// Approximate part of the light that reaches the row's cluster, above 0.
+    /// Approximate part of the light that reaches the row's cell, above 0.
     pub visibility: f32,
     /// The same of the alias.
     pub alias_visibility: f32,
