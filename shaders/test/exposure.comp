@@ -1,5 +1,5 @@
 #version 460
-// Test of what `relight::exposure` and `relight::overbright` repeat: constants, and the curves from 0 to 4.
+// Constants and curves, from 0 to 4, for the test that compares them with `relight::exposure` and `relight::overbright`.
 #define OWN_PUSH
 #include "trace/exposure.glsl"
 #include "trace/tone_curve.glsl"

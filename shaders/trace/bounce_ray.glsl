@@ -1,5 +1,5 @@
-// Data that the passes of a single bounce exchange. Each cell of 2 x 2 pixels, of which one gathers, has 64 bytes: the
-// scratch texels of its four pixels.
+// Data that the passes of a single bounce exchange: 64 bytes for each cell of 2 x 2 pixels, which are the scratch texels
+// of its four pixels. One pixel of a cell gathers bounced light.
 #ifndef RELIGHT_TRACE_BOUNCE_RAY_GLSL
 #define RELIGHT_TRACE_BOUNCE_RAY_GLSL
 

@@ -39,7 +39,7 @@ vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint mask, uint 
     uint rays = 1, picks = 1;
     LightSet from = set;
     if (selection == SELECT_ALL) {
-        // one ray for each light, except the weak ones, of which a few are sampled by their contribution
+        // one ray for each strong light; a few of the weak lights are sampled by their contribution
         uint weak = set.listed - set.strong;
         from = LightSet(set.first + set.listed, weak, 0, 0, 0, 0);
         picks = min(weak, WEAK_RAYS);

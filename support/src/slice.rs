@@ -1,7 +1,7 @@
-//! Parts of lists that exist because our own code made the list and the place in it.
+//! Access to lists by indices that are in range by construction.
 //!
-//! A place outside the list is an error of ours: it fails an assertion in debug builds. In release builds it names
-//! nothing, so that a frame goes on without what is missing.
+//! An index out of range is a bug: it fails an assertion in debug builds. Release builds return an empty part, a default
+//! or `None`, so that a frame continues without the missing item.
 
 use std::ops::Range;
 use std::slice::SliceIndex;

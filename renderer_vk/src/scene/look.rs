@@ -1,4 +1,4 @@
-//! What only one of the two looks reads of a view.
+//! Parts of a view that a single look reads.
 
 use std::sync::Arc;
 
@@ -7,13 +7,13 @@ use super::{
     ViewScene, VisibleSky,
 };
 
-/// A view that is rasterized: what the frustum shows, sorted; a portal or mirror has a view of its own.
+/// A view that is rasterized: the surfaces in the frustum, sorted; a portal or mirror has its own view.
 pub type ClassicScene = ViewScene<ClassicPart>;
 
-/// A view that is traced: what moves, wherever it is.
+/// A view that is traced: all moving geometry, in sight or not.
 pub type TracedScene = ViewScene<TracedPart>;
 
-/// What only the classic look reads.
+/// Data for the classic look alone.
 #[derive(Clone, Debug, Default)]
 pub struct ClassicPart {
     /// Visible surfaces in drawing order.
@@ -22,13 +22,13 @@ pub struct ClassicPart {
     pub skies: Vec<VisibleSky>,
     /// Shadow volumes of models (`cg_shadows 2`).
     pub shadows: ShadowVolumes,
-    /// What the engine's collision code wants to see.
+    /// Debug polygons of the engine's collision code (`r_debugSurface`).
     pub debug: DebugPolygons,
-    /// Counts, when `r_speeds` asks for them.
+    /// Counts for `r_speeds`.
     pub statistics: Statistics,
 }
 
-/// What only the traced look reads.
+/// Data for the traced look alone.
 #[derive(Clone, Debug, Default)]
 pub struct TracedPart {
     /// Meshes that keep their shape, see [`Shape::Rigid`](super::Shape::Rigid); one may occur many times.
