@@ -156,7 +156,7 @@ fn maps_are_lit() {
         rt_accumulate: std::env::var_os("RELIGHT_TRACE_LIVE").is_none(),
         ..Settings::full_size()
     };
-    let passes = Arc::new(PassSet::new(device, game.gpu.tracer));
+    let passes = Arc::clone(&game.gpu.passes);
     for map in maps {
         let (mut assets, mut world) = game.load(&map, &settings);
         world.light_by(settings.rt_lights, &mut assets, None);

@@ -1,6 +1,6 @@
 //! A device with the traced look, and the views that it renders.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::Vec3;
 use testkit::Need;
@@ -37,12 +37,31 @@ macro_rules! gpu_tests {
 }
 pub(crate) use gpu_tests;
 
+/// Devices that no test uses, with the pipelines compiled so far. A software driver takes seconds to compile a pass and
+/// keeps nothing from one device to the next, so that tests use devices in turns.
+static IDLE: Mutex<Vec<Shared>> = Mutex::new(Vec::new());
+
+/// A device and its pipelines, put back when a test drops them unless it failed.
+struct Shared(Arc<PassSet>);
+
+impl Drop for Shared {
+    fn drop(&mut self) {
+        if !std::thread::panicking() {
+            let mut idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner);
+            idle.push(Shared(Arc::clone(&self.0)));
+        }
+    }
+}
+
 /// A device with its validation layer on and the look under test.
 pub struct Gpu {
     pub device: Device,
     pub tracer: Tracer,
     pub look: ViewTracer,
     pub ring: FrameRing,
+    pub passes: Arc<PassSet>,
+    /// Dropped last, when nothing of this test is left on the device.
+    _shared: Shared,
 }
 
 impl Gpu {
@@ -98,6 +117,28 @@ impl Gpu {
 
     /// An error message without a device for the tracer.
     fn open(tracer: Tracer) -> Result<Self, String> {
+        let idle = {
+            let mut idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner);
+            let place = idle.iter().position(|shared| shared.0.tracer() == tracer);
+            place.map(|place| idle.swap_remove(place))
+        };
+        let shared = match idle {
+            Some(shared) => shared,
+            None => Shared(Arc::new(PassSet::new(&Self::open_device(tracer)?, tracer))),
+        };
+        let passes = Arc::clone(&shared.0);
+        let device = passes.device().clone();
+        Ok(Self {
+            look: ViewTracer::new(&passes).expect("a device"),
+            tracer,
+            ring: FrameRing::new(&device, 2).expect("frames"),
+            device,
+            passes,
+            _shared: shared,
+        })
+    }
+
+    fn open_device(tracer: Tracer) -> Result<Device, String> {
         let options = DeviceOptions {
             validation: true,
             // with the tracer's extensions disabled, to prove that it needs none
@@ -122,12 +163,7 @@ impl Gpu {
                 })
                 .expect("sampler");
         }
-        Ok(Self {
-            look: ViewTracer::new(&Arc::new(PassSet::new(&device, tracer))).expect("a device"),
-            tracer,
-            ring: FrameRing::new(&device, 2).expect("frames"),
-            device,
-        })
+        Ok(device)
     }
 
     /// Switches ray counters for subsequent frames.
