@@ -1,6 +1,6 @@
 #version 460
 // Constants and curves, from 0 to 4, for the test that compares them with `relight::exposure` and `relight::overbright`.
-#define OWN_PUSH
+#define FILTER_STEP
 #include "trace/exposure.glsl"
 #include "trace/tone_curve.glsl"
 

@@ -1,6 +1,6 @@
 #version 460
 // Test of the target function of light sampling, which the CPU repeats for the chances of lights.
-#define OWN_PUSH
+#define FILTER_STEP
 #include "trace/lights.glsl"
 
 layout(local_size_x = 64) in;

@@ -2,7 +2,7 @@
 // A step of the edge-avoiding a-trous wavelet filter (Dammertz et al., HPG 2010), guided by normals, the surface's
 // plane and the variance of the light (Schied et al. 2017, sections 4.3 and 4.4). The kernel is 3 x 3. Direct and
 // indirect light share the weights of the surface and have their own weights of luminance.
-#define OWN_PUSH
+#define FILTER_STEP
 #extension GL_EXT_control_flow_attributes : require
 #include "trace/denoise.glsl"
 

@@ -1,7 +1,7 @@
 #version 460
 // Filters the light in fog over cells with a similar amount of fog: light in the air changes slowly, the length of the
 // visible segment does not.
-#define OWN_PUSH
+#define FILTER_STEP
 #include "trace/color.glsl"
 #include "trace/light_image.glsl"
 #include "trace/view.glsl"

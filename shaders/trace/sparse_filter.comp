@@ -4,7 +4,7 @@
 // averages their results (Willberger, Musterle, Bergmann, Deferred Hybrid Path Tracing, Ray Tracing Gems, 2019, chapter
 // 26: few taps in several passes in place of a dense kernel). It keeps no variance: the number of accumulated frames
 // estimates the noise.
-#define OWN_PUSH
+#define FILTER_STEP
 #include "trace/sparse_filter.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;

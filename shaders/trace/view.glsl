@@ -28,9 +28,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Li
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightRows { LightRow at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer DynamicRows { DynamicRow at[]; };
 
-#ifdef OWN_PUSH
-// push constants of filter steps: addresses of texels or bindless indices of images; spacing of the taps, pixels
-layout(push_constant, scalar) uniform Push { uint64_t view; uint64_t source; uint64_t target; uint spacing; } push;
+#ifdef FILTER_STEP
+layout(push_constant, scalar) uniform Push { FilterStep push; };
 #else
 layout(push_constant, scalar) uniform Push { uint64_t view; } push;
 #endif

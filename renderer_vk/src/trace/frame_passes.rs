@@ -1,6 +1,6 @@
 //! Recording of the traced look's passes for one view.
 
-use shaders::trace_types::constants::RAY_TILE;
+use shaders::trace_types::{FilterStep, constants::RAY_TILE};
 
 use super::pass_set::{PassSet, Pipeline};
 use super::passes::{Pass, Resource, Size, Switch, TABLE};
@@ -66,17 +66,6 @@ fn ray_tiles(traced: [u32; 2], pipeline: &Pipeline) -> [u32; 2] {
     }
 }
 
-/// Input and output of a filter step: addresses of texels or bindless indices of images.
-#[repr(C)]
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Step {
-    view: u64,
-    source: u64,
-    target: u64,
-    spacing: u32,
-    padding: u32,
-}
-
 /// Records the passes of a view.
 pub struct FramePasses<'a> {
     set: &'a PassSet,
@@ -123,7 +112,7 @@ impl<'a> FramePasses<'a> {
         target: u64,
         spacing: u32,
     ) -> Result<(), Error> {
-        let step = Step {
+        let step = FilterStep {
             view: self.view,
             source,
             target,

@@ -17,6 +17,22 @@ pub struct GeometryRecord {
     pub kind: u32,
 }
 
+/// Push constants of a filter step.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct FilterStep {
+    /// The `TraceView`.
+    pub view: u64,
+    /// Input: address of texels, or bindless index of an image.
+    pub source: u64,
+    /// Output, likewise.
+    pub target: u64,
+    /// Distance of the taps, pixels.
+    pub spacing: u32,
+    /// Makes the size a multiple of 8 bytes.
+    pub padding: u32,
+}
+
 /// A node of a bounding volume hierarchy: boxes of up to four children, quantized to a grid of the node (after Ylitie,
 /// Karras and Laine, Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs, HPG 2017).
 #[repr(C)]

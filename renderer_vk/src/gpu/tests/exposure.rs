@@ -2,20 +2,9 @@
 
 use super::support::{collect, device, finish};
 use crate::gpu::*;
-use bytemuck::{Pod, Zeroable};
 use relight::exposure::{BRIGHT_PART, DARK_PART, DARKEST, tone_curve};
 use relight::overbright::{from_linear, to_linear};
-
-/// As `OWN_PUSH` of `shaders/trace/view.glsl`.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Push {
-    view: u64,
-    source: u64,
-    target: u64,
-    spacing: u32,
-    padding: u32,
-}
+use shaders::trace_types::FilterStep;
 
 #[test]
 fn constants_and_curves_are_those_of_the_shaders() {
@@ -42,12 +31,10 @@ fn constants_and_curves_are_those_of_the_shaders() {
         .pass("exposure", Access::COMPUTE, Access::COMPUTE)
         .unwrap();
     pass.bind_compute(&pipeline);
-    pass.push(&Push {
-        view: 0,
-        source: 0,
+    pass.push(&FilterStep {
         target: buffer.address(),
         spacing: STEPS,
-        padding: 0,
+        ..FilterStep::default()
     });
     pass.dispatch(STEPS.div_ceil(64), 1, 1);
     drop(pass);

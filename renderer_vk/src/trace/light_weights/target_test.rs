@@ -21,17 +21,6 @@ struct Query {
     light: u32,
 }
 
-/// As `OWN_PUSH` of `shaders/trace/view.glsl`.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Push {
-    view: u64,
-    source: u64,
-    target: u64,
-    spacing: u32,
-    padding: u32,
-}
-
 #[test]
 fn light_targets_match_the_shaders() {
     let options = DeviceOptions {
@@ -76,7 +65,7 @@ fn light_targets_match_the_shaders() {
         .pass("light target", Access::COMPUTE, Access::COMPUTE)
         .unwrap();
     pass.bind_compute(&pipeline);
-    pass.push(&Push {
+    pass.push(&t::FilterStep {
         view: view.address(),
         source: source.address(),
         target: target.address(),
