@@ -4,14 +4,14 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use glam::Vec3;
 use relight::GameFiles;
-use relight::viewpoints::{self, EYE_HEIGHT, Viewpoint};
+use relight::viewpoints::{self, VIEW_HEIGHT, Viewpoint};
 
 use crate::game::Game;
 use crate::view::{map_name, open};
 
 /// List places to look at maps from: intermission cameras and spawn points
 ///
-/// Prints a line for each: the map, a tab, and X Y Z YAW as the game's setviewpos takes them. The eye is 26 units above.
+/// Prints a line for each: the map, a tab, and X Y Z YAW as the game's setviewpos takes them. The camera is 26 units above.
 ///
 /// Examples: relight cameras oa_dm1; relight cameras --views 1 --every 3
 #[derive(Args, Debug)]
@@ -100,7 +100,7 @@ pub fn places(entities: &[q3bsp::Entity], count: usize) -> Vec<Place> {
     views.extend((0..wanted).filter_map(|i| spawns.get(i * spawns.len() / wanted)));
     views.truncate(count);
     let place = |view: Viewpoint| Place {
-        origin: (view.eye - Vec3::Z * EYE_HEIGHT).round(),
+        origin: (view.position - Vec3::Z * VIEW_HEIGHT).round(),
         yaw: view.yaw.round(),
     };
     views.into_iter().map(place).collect()

@@ -124,9 +124,13 @@ pub struct Camera {
 
 impl From<Viewpoint> for Camera {
     fn from(view: Viewpoint) -> Self {
-        let Viewpoint { eye, yaw, pitch } = view;
+        let Viewpoint {
+            position,
+            yaw,
+            pitch,
+        } = view;
         Self {
-            origin: eye,
+            origin: position,
             yaw,
             pitch,
         }

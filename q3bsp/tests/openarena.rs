@@ -150,12 +150,12 @@ fn geometry_is_the_right_way_round() {
         }
         for entity in bsp.entities() {
             if entity.classname() == "info_player_deathmatch" {
-                let eye = entity.vec3("origin").unwrap() + glam::Vec3::Z * 26.0;
+                let camera = entity.vec3("origin").unwrap() + glam::Vec3::Z * 26.0;
                 spawns += 1;
-                spawns_inside += u32::from(bsp.cluster_at(eye) >= 0 || bsp.num_clusters() == 0);
+                spawns_inside += u32::from(bsp.cluster_at(camera) >= 0 || bsp.num_clusters() == 0);
                 let light = bsp
                     .light_grid()
-                    .and_then(|grid| grid.sample(&bsp.light_grid, eye));
+                    .and_then(|grid| grid.sample(&bsp.light_grid, camera));
                 spawns_lit += u32::from(light.is_some_and(|l| l.ambient.max_element() > 0.0));
             }
         }

@@ -2,10 +2,10 @@
 #ifndef RELIGHT_FOG_GLSL
 #define RELIGHT_FOG_GLSL
 
-// Fraction of the segment from the camera to a vertex that lies below the fog's surface. `below`, `eye_below`: depth of
+// Fraction of the segment from the camera to a vertex that lies below the fog's surface. `below`, `camera_below`: depth of
 // the vertex and of the camera below that surface, units.
-float fog_share(float below, float eye_below) {
-    if (eye_below < 0.0) return below < 1.0 ? 0.0 : below / (below - eye_below);
+float fog_share(float below, float camera_below) {
+    if (camera_below < 0.0) return below < 1.0 ? 0.0 : below / (below - camera_below);
     return below < 0.0 ? 0.0 : 1.0;
 }
 

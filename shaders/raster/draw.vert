@@ -23,12 +23,12 @@ layout(location = 8) out flat vec4 out_flat_color[STAGES];
 vec2 fog_coordinates(uint number, vec3 world) {
     Fogs fogs = Fogs(VIEW.fogs);
     uint index = number - 1;
-    vec3 eye = VIEW.eye;
-    float s = dot(world - eye, VIEW.forward) / (8.0 * fogs.at[index].depth) + 1.0 / 512.0;
+    vec3 camera = VIEW.origin;
+    float s = dot(world - camera, VIEW.forward) / (8.0 * fogs.at[index].depth) + 1.0 / 512.0;
     float share = 1.0;
     if (fogs.at[index].has_surface != 0) {
         vec4 plane = fogs.at[index].plane;
-        share = fog_share(dot(plane.xyz, world) - plane.w, dot(plane.xyz, eye) - plane.w);
+        share = fog_share(dot(plane.xyz, world) - plane.w, dot(plane.xyz, camera) - plane.w);
     }
     float t = 1.0 / 32.0 + (30.0 / 32.0) * share;
     return vec2(s, t);
@@ -98,7 +98,7 @@ void main() {
         Instance instance = instances.at[index];
         StagePoint point = StagePoint(position, vertices.at[gl_VertexIndex].normal, vertices.at[gl_VertexIndex].st,
             vertices.at[gl_VertexIndex].lightmap, unpackUnorm4x8(vertices.at[gl_VertexIndex].color),
-            draws.at[gl_InstanceIndex].time, VIEW.identity_light, distance(VIEW.eye, world));
+            draws.at[gl_InstanceIndex].time, VIEW.identity_light, distance(VIEW.origin, world));
         // unrolled by hand, so that every compiler sees constant arguments
         write_stage(draws, instance, point, 0);
 #ifdef MANY_STAGES

@@ -235,7 +235,7 @@ pub struct RasterView {
     /// Only the positive side of `xyz.p = w` is drawn; zero: everything.
     pub clip_plane: [f32; 4],
     /// Camera position, world space.
-    pub eye: Vec3,
+    pub origin: Vec3,
     /// View direction, world space.
     pub forward: Vec3,
     /// `identityLight`: 1 over 2 to the power of the overbright bits.

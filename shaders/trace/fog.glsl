@@ -33,17 +33,17 @@ float fog_cover(Fog fog, float depth, float part) {
     return sqrt(clamp(depth * part / max(fog.depth, 1.0), 0.0, 1.0));
 }
 
-// `part` of `fog_cover` for a point on a triangle: computed at the corners, as in the engine, and interpolated. `eye`:
+// `part` of `fog_cover` for a point on a triangle: computed at the corners, as in the engine, and interpolated. `camera`:
 // camera position unfolded through the mirrors and portals of the path.
-float fog_part(Fog fog, SurfacePoint p, vec3 eye) {
+float fog_part(Fog fog, SurfacePoint p, vec3 camera) {
     if (fog.has_surface == 0) return 1.0;
-    float eye_below = dot(fog.plane.xyz, eye) - fog.plane.w;
+    float camera_below = dot(fog.plane.xyz, camera) - fog.plane.w;
     Instance instance = instance_of(p.instance);
     mat3 axis = mat3(instance.axis[0], instance.axis[1], instance.axis[2]);
     float part = 0.0;
     for (int i = 0; i < 3; i++) {
         vec3 corner = axis * TraceVertices(p.vertices).at[p.triangle.indices[i]].position + instance.origin;
-        part += p.weights[i] * fog_share(dot(fog.plane.xyz, corner) - fog.plane.w, eye_below);
+        part += p.weights[i] * fog_share(dot(fog.plane.xyz, corner) - fog.plane.w, camera_below);
     }
     return part;
 }

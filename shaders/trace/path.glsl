@@ -37,7 +37,7 @@ struct Path {
     float weight;       // reciprocal of the probability of the branches taken
     float travelled;    // length of the previous segments
     LastSpace last;     // map of the path's points to the last frame
-    vec3 eye_direction; // direction of the path at the camera
+    vec3 view_direction; // direction of the path at the camera
     uint bent; // BENT_*: refracted, or mirrored by a curved surface: only the linear part of `last` is valid then
     vec3 absorption;    // of the liquid that contains the segment, per unit
     uint field;         // of the checkerboard: 1 refraction, 2 reflection; 0: the path was not split
@@ -73,7 +73,7 @@ const float MIN_GLOW = 1.0 / 256.0;
 // Map of a point of the path to the last frame. A distorted point is taken to rest at its current virtual position.
 LastSpace last_space(Path path, vec3 position, float t) {
     if (path.bent == BENT_NOT) return path.last;
-    return LastSpace(path.last.linear, VIEW.camera.origin + path.eye_direction * (path.travelled + t) - path.last.linear * position);
+    return LastSpace(path.last.linear, VIEW.camera.origin + path.view_direction * (path.travelled + t) - path.last.linear * position);
 }
 
 void keep_lit(SurfacePoint p, vec3 lit, Path path, float t) {
@@ -110,7 +110,7 @@ void record_glow(Path path, SurfacePoint p, vec3 emission, float t) {
     glow_sum += glow;
     if (brightest <= brightest_glow) return;
     brightest_glow = brightest;
-    CameraRay ray = CameraRay(path.origin, path.direction, path.eye_direction, vec2(LAUNCH_PIXEL) + vec2(0.5) + VIEW.antialias.jitter);
+    CameraRay ray = CameraRay(path.origin, path.direction, path.view_direction, vec2(LAUNCH_PIXEL) + vec2(0.5) + VIEW.antialias.jitter);
     glow_motion = motion_of(ray, last_place(last_space(path, p.position, t), p, path.travelled + t)).xyz;
 }
 

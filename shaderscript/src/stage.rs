@@ -228,7 +228,7 @@ pub enum AlphaGen {
     OneMinusVertex,
     /// A highlight of a light at a fixed place in the entity's own space.
     LightingSpecular,
-    /// Distance from the eye over `range`, clamped to 0..1.
+    /// Distance from the camera over `range`, clamped to 0..1.
     Portal {
         /// Distance in world units at which the surface is opaque.
         range: f32,

@@ -39,10 +39,10 @@ fn a_path_is_played_and_its_passes_are_told() {
     assert_eq!((picture.width(), picture.height()), (64, 48));
     assert!(picture.distinct_colors() > 30);
     let pass = |name: &str| report.passes().iter().find(|p| p.name == name);
-    let eye = pass("trace_primary_rays").expect("the traced look has it");
+    let primary_rays = pass("trace_primary_rays").expect("the traced look has it");
     // one ray for each pixel at least
-    assert!(eye.rays.iter().any(|&rays| rays >= 64.0 * 48.0));
-    assert_eq!(eye.ms.len(), 3);
+    assert!(primary_rays.rays.iter().any(|&rays| rays >= 64.0 * 48.0));
+    assert_eq!(primary_rays.ms.len(), 3);
     assert!(pass("trace_indirect").is_none(), "no bounce was asked for");
 
     let (report, _) = play(&wanted(false)).expect("it plays");

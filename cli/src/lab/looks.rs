@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::Args;
 use relight::compare::Rgb8;
-use relight::viewpoints::EYE_HEIGHT;
+use relight::viewpoints::VIEW_HEIGHT;
 use renderer_vk::api::RefDef;
 use renderer_vk::{MapLightChoice, Renderer, RendererOptions, Settings};
 use serde_json::{Value, json};
@@ -201,7 +201,7 @@ fn one(args: &LooksArgs, map: &str) -> Result<Sums> {
     let cameras: Vec<Camera> = places
         .iter()
         .map(|place| Camera {
-            origin: place.origin + glam::Vec3::Z * EYE_HEIGHT,
+            origin: place.origin + glam::Vec3::Z * VIEW_HEIGHT,
             yaw: place.yaw,
             pitch: 0.0,
         })

@@ -19,7 +19,7 @@ use clap::Args;
 use glam::Vec3;
 use indicatif::{ProgressBar, ProgressStyle};
 use relight::compare::{Rgb8, compare};
-use relight::viewpoints::EYE_HEIGHT;
+use relight::viewpoints::VIEW_HEIGHT;
 use renderer_vk::api::DynamicLight;
 use renderer_vk::{Renderer, RendererOptions, Settings};
 use serde_json::{Value, json};
@@ -334,12 +334,12 @@ fn save(folder: &Path, name: &str, picture: &Rgb8) -> Result<()> {
 
 /// The places of `relight cameras`, seen with a player's eyes.
 fn ruled_cameras(entities: &[q3bsp::Entity], each: usize) -> Vec<Camera> {
-    let eyes = |at: &Place| Camera {
-        origin: at.origin + Vec3::Z * EYE_HEIGHT,
+    let camera = |at: &Place| Camera {
+        origin: at.origin + Vec3::Z * VIEW_HEIGHT,
         yaw: at.yaw,
         pitch: 0.0,
     };
-    places(entities, each).iter().map(eyes).collect()
+    places(entities, each).iter().map(camera).collect()
 }
 
 /// Runs the command.

@@ -24,7 +24,7 @@ const MOST_PAIRS: usize = 1 << 26;
 /// The engine's drawing order in a plane; greater is drawn later, above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DrawOrder {
-    /// The material has `polygonOffset`: it is moved towards the eye.
+    /// The material has `polygonOffset`: it is moved towards the camera.
     pub offset: bool,
     /// Its sort value.
     pub sort: f32,

@@ -136,7 +136,7 @@ impl Material {
     }
 
     /// Whether its surfaces turn to the camera.
-    pub fn turns_to_eye(&self) -> bool {
+    pub fn faces_camera(&self) -> bool {
         let turns = |d: &Deform| matches!(d, Deform::AutoSprite | Deform::AutoSprite2);
         self.shader.deforms.iter().any(turns)
     }

@@ -64,8 +64,8 @@ pub struct ViewParameters<'a> {
     pub near_world_to_clip: Option<Mat4>,
     /// Only the positive side of `xyz.p = w` shows; zero: everything.
     pub clip_plane: [f32; 4],
-    /// Eye.
-    pub eye: Vec3,
+    /// Camera position, world space.
+    pub origin: Vec3,
     /// View direction.
     pub forward: Vec3,
     /// See [`RasterView::identity_light`].
@@ -283,7 +283,7 @@ impl Raster {
         let view = RasterView {
             world_to_clip: p.world_to_clip.to_cols_array_2d(),
             clip_plane: p.clip_plane,
-            eye: p.eye,
+            origin: p.origin,
             forward: p.forward,
             identity_light: p.identity_light,
             light_backs: p.light_backs.into(),

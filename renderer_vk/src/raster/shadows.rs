@@ -19,7 +19,7 @@ use crate::scene::{ShadowVolumes, View};
 
 /// Brightness of what lies in shadow.
 const SHADE: f32 = 0.6;
-/// Distance from the eye, units, at which the engine draws the shade: what is nearer stays bright.
+/// Distance from the camera, units, at which the engine draws the shade: what is nearer stays bright.
 const SHADE_DISTANCE: f32 = 10.0;
 
 #[repr(C)]

@@ -1,4 +1,4 @@
-//! The sky of the classic look: a box around the eye, cloud layers projected from a sphere onto it, and the sun.
+//! The sky of the classic look: a box around the camera, cloud layers projected from a sphere onto it, and the sun.
 //!
 //! Source: the engine's sky as described in its behaviour: faces and their texture axes, a dome over a planet of
 //! radius 4096 for the clouds, depth at the far end.
@@ -40,7 +40,7 @@ pub struct Mesh<'a> {
 }
 
 impl Mesh<'_> {
-    /// Appends the given cells of a face of the box around a view's eye and returns the range of their indices.
+    /// Appends the given cells of a face of the box around a view's camera and returns the range of their indices.
     pub fn append_face(
         &mut self,
         face: usize,

@@ -88,7 +88,7 @@ impl Renderer {
             world_to_clip: Mat4::IDENTITY,
             near_world_to_clip: None,
             clip_plane: [0.0; 4],
-            eye: Vec3::ZERO,
+            origin: Vec3::ZERO,
             forward: Vec3::Z,
             identity_light: self.settings.identity_light(),
             materials: assets.materials.addresses(),

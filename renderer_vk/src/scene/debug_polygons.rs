@@ -19,16 +19,16 @@ impl DebugPolygons {
         self.sizes.clear();
     }
 
-    /// Adds a convex polygon unless `eye` sees it from behind: a front winds clockwise. Of `color` the lowest three
+    /// Adds a convex polygon unless `camera` sees it from behind: a front winds clockwise. Of `color` the lowest three
     /// bits are red, green and blue.
-    pub fn add(&mut self, color: u32, corners: &[Vec3], eye: Vec3) {
+    pub fn add(&mut self, color: u32, corners: &[Vec3], camera: Vec3) {
         let [a, b, c, ..] = *corners else { return };
         let normal = (c - a).cross(b - a);
         let finite = corners.iter().all(|corner| corner.is_finite());
         let Some(size) = u32::try_from(corners.len()).ok().filter(|_| finite) else {
             return;
         };
-        if normal.dot(eye - a) <= 0.0 {
+        if normal.dot(camera - a) <= 0.0 {
             return;
         }
         let channel = |bit: u32| (((color >> bit) & 1) * 0xFF) << (8 * bit);

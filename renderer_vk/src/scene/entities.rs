@@ -63,7 +63,7 @@ impl Gatherer<'_> {
         let turns = matches!(
             entity.kind,
             EntityKind::Sprite | EntityKind::RailCore | EntityKind::Lightning
-        ) || materials.get(material).turns_to_eye();
+        ) || materials.get(material).faces_camera();
         let ways = self.ways_of(entity, turns);
         for way in 0..ways {
             let Some(Way { paths, view }) = self.way(way, ways) else {
@@ -189,7 +189,7 @@ impl Gatherer<'_> {
                 // its box was tested; its surfaces are tested by facing alone
                 let placed = slice::get(&out.instances, instance as usize);
                 let local = LocalView {
-                    eye: placed.map_or(Vec3::ZERO, |i| i.viewer),
+                    camera: placed.map_or(Vec3::ZERO, |i| i.viewer),
                     frustum: &[],
                     lights: &lights,
                     forward: placed.map_or(Vec3::X, |i| entity::into_axes(i, self.view.axis[0])),

@@ -61,8 +61,8 @@ impl FlareView<'_> {
         let facing = if flare.normal == Vec3::ZERO {
             1.0
         } else {
-            let to_eye = (view.origin - flare.origin).normalize_or_zero();
-            to_eye.dot(flare.normal)
+            let to_camera = (view.origin - flare.origin).normalize_or_zero();
+            to_camera.dot(flare.normal)
         };
         if facing < 0.0 {
             return None;
@@ -134,10 +134,10 @@ fn fog_factor(fog: &types::Fog, view: &View, point: Vec3) -> f32 {
     let t = if fog.has_surface == 0 {
         31.0 / 32.0
     } else {
-        let (here, eye) = (below(point), below(view.origin));
-        match (eye < 0.0, here) {
+        let (here, camera) = (below(point), below(view.origin));
+        match (camera < 0.0, here) {
             (true, ..1.0) | (false, ..0.0) => 1.0 / 32.0,
-            (true, _) => 1.0 / 32.0 + (30.0 / 32.0) * here / (here - eye),
+            (true, _) => 1.0 / 32.0 + (30.0 / 32.0) * here / (here - camera),
             (false, _) => 31.0 / 32.0,
         }
     };

@@ -139,7 +139,7 @@ pub(super) struct Gatherer<'a> {
     /// The view is traced; otherwise it is rasterized.
     pub(super) traced: bool,
     pub(super) view: View,
-    /// The views through portals, by the numbers of their paths: what turns to the eye turns to these, too.
+    /// The views through portals, by the numbers of their paths: what turns to the camera turns to these, too.
     turned: &'a [Option<View>],
     /// The world, when the view shows it.
     pub(super) world: Option<&'a WorldData>,
@@ -288,11 +288,11 @@ impl<'a> Gatherer<'a> {
         );
         let bounds = self.visible.bounds;
         if !bounds.is_empty() {
-            let eye = self.view.origin;
+            let camera = self.view.origin;
             let far = bounds
                 .corners()
                 .into_iter()
-                .map(|corner| corner.distance(eye))
+                .map(|corner| corner.distance(camera))
                 .fold(0.0, f32::max);
             self.view.far = far.max(self.view.near * 2.0);
             self.view.update();
@@ -314,7 +314,7 @@ impl<'a> Gatherer<'a> {
             &mut lights,
         );
         let local = LocalView {
-            eye: self.view.origin,
+            camera: self.view.origin,
             frustum: self.planes(),
             lights: &lights,
             forward: self.view.axis[0],
@@ -378,7 +378,7 @@ impl<'a> Gatherer<'a> {
             world,
             materials: self.input.materials,
             local,
-            eye: self.view.origin,
+            camera: self.view.origin,
             instance,
             placed: slice::get(instances, instance as usize),
             entity,
@@ -411,7 +411,7 @@ impl<'a> Gatherer<'a> {
             let Some(surface) = slice::get(&world.surfaces, deform.surface as usize) else {
                 continue;
             };
-            let turns = self.input.materials.get(deform.material).turns_to_eye();
+            let turns = self.input.materials.get(deform.material).faces_camera();
             let ways = if turns { self.turned.len() + 1 } else { 1 };
             for way in 0..ways {
                 let Some(Way { paths, .. }) = self.way(way, ways) else {
@@ -445,7 +445,7 @@ impl<'a> Gatherer<'a> {
         }
     }
 
-    /// On how many ways the eye may see an entity: one, if it does not turn to the eye, or is seen straight on alone.
+    /// On how many ways the camera may see an entity: one, if it does not turn to the eye, or is seen straight on alone.
     pub(super) fn ways_of(&self, entity: &RefEntity, turns: bool) -> usize {
         let first_person = entity.renderfx & renderfx::FIRST_PERSON != 0;
         if turns && !first_person {

@@ -73,7 +73,7 @@ pub(super) fn level_of_detail(
     } else {
         (radius / (view.tan_y * distance)).min(1.0)
     };
-    // a model behind the eye gets the finest level, as one whose projected size is zero
+    // a model behind the camera gets the finest level, as one whose projected size is zero
     let level = if size == 0.0 {
         0.0
     } else {

@@ -273,7 +273,7 @@ impl Gatherer<'_> {
             if volumes && Some(asked) != shadow {
                 out.add_shadow_volumes(&raw);
             }
-            let turns = self.input.materials.get(material).turns_to_eye();
+            let turns = self.input.materials.get(material).faces_camera();
             let ways = self.ways_of(placed.entity, turns);
             for way in 0..ways {
                 let Some(Way { paths, .. }) = self.way(way, ways) else {

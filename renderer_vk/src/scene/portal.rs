@@ -246,7 +246,7 @@ fn camera_axes(entity: &RefEntity, def: &RefDef) -> [Vec3; 3] {
     [forward, left, forward.cross(left)]
 }
 
-/// Whether some triangle is turned to the eye and in the view; with `reach`, also near enough.
+/// Whether some triangle is turned to the camera and in the view; with `reach`, also near enough.
 fn in_sight(triangles: &[[Vec3; 3]], view: &View, reach: Option<f32>) -> bool {
     let frustum = view.frustum();
     let corners = || triangles.iter().flatten();
@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mirror_reflects_eye_and_axes() {
+    fn a_mirror_reflects_camera_and_axes() {
         let at = Vec3::new(90.0, 5.0, 0.0);
         let def = RefDef::default();
         let portal = portal_at(wall(), &[marker(at, at)], &def).unwrap();

@@ -1,6 +1,6 @@
 //! Shadow volumes of models (`cg_shadows 2`): the outline of a mesh as its light sees it, drawn out away from the light.
 //!
-//! Source: engine behaviour of `renderer_opengl1` (stencil shadows). Where the eye looks into a volume more often than
+//! Source: engine behaviour of `renderer_opengl1` (stencil shadows). Where the camera looks into a volume more often than
 //! out of it, there is shadow. The volumes have no ends; they stop far below any floor that would show them.
 
 use glam::Vec3;
@@ -16,7 +16,7 @@ const REACH: f32 = 512.0;
 pub struct ShadowVolumes {
     /// Corners.
     pub positions: Vec<Vec3>,
-    /// Three for each triangle. A side that faces the eye winds counter-clockwise on the screen (in a mirror,
+    /// Three for each triangle. A side that faces the camera winds counter-clockwise on the screen (in a mirror,
     /// clockwise).
     pub indices: Vec<u32>,
     /// First index and number of indices of each entity's volumes: an entity counts up before it counts down.

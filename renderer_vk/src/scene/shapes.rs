@@ -225,10 +225,10 @@ impl MeshBuilder<'_> {
     }
 }
 
-/// Unit vector across a line as the eye sees it; zero when the eye is on the line.
-fn side_of_line(start: Vec3, end: Vec3, eye: Vec3) -> Vec3 {
-    let to_start = (start - eye).normalize_or_zero();
-    let to_end = (end - eye).normalize_or_zero();
+/// Unit vector across a line as the camera sees it; zero when the camera is on the line.
+fn side_of_line(start: Vec3, end: Vec3, camera: Vec3) -> Vec3 {
+    let to_start = (start - camera).normalize_or_zero();
+    let to_end = (end - camera).normalize_or_zero();
     to_start.cross(to_end).normalize_or_zero()
 }
 

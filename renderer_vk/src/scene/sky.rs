@@ -1,4 +1,4 @@
-//! What of a sky is in sight: the cells of the box around the eye that its surfaces cover.
+//! What of a sky is in sight: the cells of the box around the camera that its surfaces cover.
 //!
 //! Source: engine behaviour of `renderer_opengl1`: surfaces of a sky are projected onto the faces of a cube; each face
 //! shows the rectangle of its 8 x 8 cells that they span.
@@ -12,7 +12,7 @@ pub const FACES: usize = 6;
 pub const CELLS: usize = 8;
 /// Polygons below about this share of a face cover nothing.
 const SMALLEST_SHARE: f32 = 1e-6;
-/// What lies nearer to the plane of the eye than this covers nothing, units.
+/// What lies nearer to the plane of the camera than this covers nothing, units.
 const NEAREST: f32 = 0.001;
 
 /// The inverse of [`shaderscript::Sky::side_point`]: a direction as `(s, t)` of a face, both times the depth towards it, and that depth.
@@ -75,7 +75,7 @@ impl SkyCoverage {
         extent: [(Vec2::NEG_ONE, Vec2::ONE); FACES],
     };
 
-    /// Adds a triangle, as seen from the eye.
+    /// Adds a triangle, as seen from the camera.
     pub fn add(&mut self, triangle: [Vec3; 3]) {
         for (face, (low, high)) in self.extent.iter_mut().enumerate() {
             let mut polygon = Polygon::new(triangle.map(|p| face_point(face, p)));
@@ -126,7 +126,7 @@ impl Polygon {
         part(&self.points, ..self.count)
     }
 
-    /// It has no area as seen from the eye: a triangle that touches a face of the cube with a corner or an edge alone.
+    /// It has no area as seen from the camera: a triangle that touches a face of the cube with a corner or an edge alone.
     fn covers_nothing(&self) -> bool {
         let corners = self.corners();
         let next = corners.iter().cycle().skip(1);
@@ -134,7 +134,7 @@ impl Polygon {
         let Some(first) = corners.first() else {
             return true;
         };
-        // the volume between it and the eye, in proportion to its extent
+        // the volume between it and the camera, in proportion to its extent
         let extent = corners.iter().map(|p| p.length()).fold(0.0, f32::max);
         twice_area.dot(*first).abs() <= SMALLEST_SHARE * extent.powi(3)
     }
@@ -181,7 +181,7 @@ mod tests {
     #[test]
     fn a_ceiling_covers_the_top_alone() {
         let mut coverage = SkyCoverage::EMPTY;
-        // x from -10 to 20 and y from -5 to 5, 100 above the eye: t = -x / z, s = -y / z
+        // x from -10 to 20 and y from -5 to 5, 100 above the camera: t = -x / z, s = -y / z
         let at = |x: f32, y: f32| Vec3::new(x, y, 100.0);
         coverage.add([at(-10.0, -5.0), at(20.0, -5.0), at(20.0, 5.0)]);
         let top = coverage.cells(4).unwrap();
@@ -209,7 +209,7 @@ mod tests {
 
     #[test]
     fn what_touches_a_face_with_an_edge_covers_nothing_of_it() {
-        // two walls of a cube around the eye touch the ceiling with an edge each, whose box is all of the ceiling
+        // two walls of a cube around the camera touch the ceiling with an edge each, whose box is all of the ceiling
         let mut coverage = SkyCoverage::EMPTY;
         for face in [0, 1] {
             let at = |s: f32, t: f32| Sky::side_point(face, s, t) * 256.0;

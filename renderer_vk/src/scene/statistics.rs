@@ -44,7 +44,7 @@ pub struct Statistics {
     pub patches: CullCounts,
     /// Models.
     pub models: CullCounts,
-    /// Cluster of the eye; -1: outside of the map.
+    /// Cluster of the camera; -1: outside of the map.
     pub cluster: i32,
     /// Surfaces that a dynamic light reaches.
     pub lit_surfaces: u32,

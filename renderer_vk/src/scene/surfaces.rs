@@ -16,7 +16,7 @@ use crate::world::{WorldData, WorldSurface, outside};
 pub(super) const WORLD_ENTITY: u32 = 0xF_FFFF;
 /// As many dynamic lights as fit the bits of a surface.
 const MAX_LIGHT_BITS: usize = 32;
-/// How far behind a face the eye may be before the face counts as turned away, units.
+/// How far behind a face the camera may be before the face counts as turned away, units.
 const BACK_FACE_SLACK: f32 = 8.0;
 
 /// The engine's drawing order in one number: material's place, entity, fog, touched by a light or not.
@@ -40,8 +40,8 @@ pub(super) struct LocalLight {
 
 /// Where surfaces are seen from, in the space of their model.
 pub(super) struct LocalView<'a> {
-    /// Eye.
-    pub eye: Vec3,
+    /// Camera position, model space.
+    pub camera: Vec3,
     /// Planes pointing inwards; empty when nothing is culled.
     pub frustum: &'a [Vec4],
     /// Dynamic lights.
@@ -103,7 +103,7 @@ impl LocalView<'_> {
         let Some(plane) = surface.plane.filter(|_| surface.flat && self.by_facing) else {
             return false;
         };
-        let distance = plane.distance(self.eye);
+        let distance = plane.distance(self.camera);
         match cull {
             Cull::Front => distance < -BACK_FACE_SLACK,
             Cull::Back => distance > BACK_FACE_SLACK,
@@ -117,8 +117,8 @@ pub(super) struct SurfaceRun<'a> {
     pub world: &'a WorldData,
     pub materials: &'a Materials,
     pub local: &'a LocalView<'a>,
-    /// Eye in the world.
-    pub eye: Vec3,
+    /// Camera position, world space.
+    pub camera: Vec3,
     /// Index of the instance.
     pub instance: u32,
     /// The instance.
@@ -149,7 +149,7 @@ impl SurfaceRun<'_> {
         }
         let (first_index, index_count) = match &surface.lod {
             Some(lod) if !deforms => {
-                let depth = self.local.forward.dot(lod.origin() - self.local.eye);
+                let depth = self.local.forward.dot(lod.origin() - self.local.camera);
                 lod.choose(depth, self.curve_error)
             }
             _ => {
@@ -186,7 +186,7 @@ impl SurfaceRun<'_> {
                 index_count,
             },
             flat: surface.flat,
-            distance_squared: surface.bounds.distance_squared(self.local.eye),
+            distance_squared: surface.bounds.distance_squared(self.local.camera),
         });
         None
     }
@@ -218,7 +218,7 @@ impl SurfaceRun<'_> {
         };
         if let Some(sky) = out.skies.get_mut(at) {
             for triangle in self.world.triangles(first_index, index_count) {
-                let seen = triangle.map(|p| entity::to_world(placed, p) - self.eye);
+                let seen = triangle.map(|p| entity::to_world(placed, p) - self.camera);
                 sky.coverage.add(seen);
             }
         }
@@ -303,7 +303,7 @@ mod tests {
     #[test]
     fn lights_reach_boxes() {
         let local = LocalView {
-            eye: Vec3::ZERO,
+            camera: Vec3::ZERO,
             frustum: &[],
             lights: &[0.0, 100.0].map(|x| LocalLight {
                 local: Vec3::X * x,

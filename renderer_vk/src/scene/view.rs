@@ -8,7 +8,7 @@ use crate::stereo::Stereo;
 /// A camera with its viewport. World space is id Tech's; clip space is Vulkan's (y down, depth 0..1).
 #[derive(Clone, Copy, Debug)]
 pub struct View {
-    /// Eye, world space.
+    /// Camera position, world space.
     pub origin: Vec3,
     /// Forward, left, up.
     pub axis: [Vec3; 3],
@@ -30,7 +30,7 @@ pub struct View {
     pub clip_plane: Option<Vec4>,
     /// This is what a portal or mirror shows.
     pub is_portal: bool,
-    /// The eye's place beside the middle.
+    /// The camera's place beside the middle.
     pub stereo: Stereo,
 }
 
@@ -56,7 +56,7 @@ impl View {
         view
     }
 
-    /// The view with the eye at another place beside the middle.
+    /// The view with the camera at another place beside the middle.
     #[must_use]
     pub fn with_stereo(mut self, stereo: Stereo) -> Self {
         self.stereo = stereo;
@@ -105,7 +105,7 @@ impl View {
         project * rotate * Mat4::from_translation(-self.origin)
     }
 
-    /// Depth of what is so far in front of the eye, 0 and 1 outside of the near and far plane.
+    /// Depth of what is so far in front of the camera, 0 and 1 outside of the near and far plane.
     pub fn depth_at(&self, distance: f32) -> f32 {
         if distance <= self.near {
             return 0.0;
@@ -117,10 +117,10 @@ impl View {
     /// The four side planes of the view's pyramid, pointing inwards: `xyz.p >= w` is inside.
     pub fn frustum(&self) -> [Vec4; 4] {
         let [forward, left, up] = self.axis;
-        let eye = self.origin + left * self.stereo.offset();
+        let camera = self.origin + left * self.stereo.offset();
         let plane = |normal: Vec3| {
             let normal = normal.normalize();
-            normal.extend(normal.dot(eye))
+            normal.extend(normal.dot(camera))
         };
         let slope = self.stereo.slope;
         [

@@ -395,8 +395,8 @@ impl MapLights {
     }
 
     /// Fog volumes that may be visible from a point; all if their visibility is unknown.
-    pub(super) fn fogs_seen_from(&self, eye: Vec3) -> impl Fn(usize) -> bool {
-        let cluster = self.sight.cluster_at(eye);
+    pub(super) fn fogs_seen_from(&self, camera: Vec3) -> impl Fn(usize) -> bool {
+        let cluster = self.sight.cluster_at(camera);
         move |fog| {
             let reach = self.fog_reach.get(fog).zip(cluster);
             reach.is_none_or(|(reach, cluster)| reach.contains(cluster))

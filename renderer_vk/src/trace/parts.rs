@@ -257,13 +257,13 @@ fn triangle_flags(mesh: &DynamicMesh, instance: &Instance, kind: Kind, info: &Ma
     } else {
         0
     };
-    let faces_eye = if instance.flags & c::INSTANCE_SUSPENDED != 0 {
-        c::TRIANGLE_FACES_EYE
+    let faces_camera = if instance.flags & c::INSTANCE_SUSPENDED != 0 {
+        c::TRIANGLE_FACES_CAMERA
     } else {
         0
     };
     let paths = u32::from(mesh.paths) << TRIANGLE_PATHS_SHIFT;
-    world | faces_eye | sides(kind) | rank_bits(info) | paths
+    world | faces_camera | sides(kind) | rank_bits(info) | paths
 }
 
 /// Source, vertices and indices of a mesh with its own structure; `None` if it lives for one frame.

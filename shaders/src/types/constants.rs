@@ -158,7 +158,7 @@ pub const FOG_SURFACE_DRAWN: u32 = 2;
 /// The triangle belongs to the world (its vertex colours and lightmap are baked light).
 pub const TRIANGLE_WORLD: u32 = 1;
 /// The triangle faces the camera; mirrors show it although they see its back.
-pub const TRIANGLE_FACES_EYE: u32 = 2;
+pub const TRIANGLE_FACES_CAMERA: u32 = 2;
 /// The triangle has an opposite in its plane, which handles rays from its back.
 pub const TRIANGLE_ONE_SIDED: u32 = 4;
 /// The triangle is static: its geometry names its instance, and `instance` is the index of its surface.

@@ -26,14 +26,14 @@ pub struct ColorContext {
     pub entity: [u8; 4],
     /// Light at the entity; `None` for what the light grid does not light: the world, sprites, pictures.
     pub light: Option<DiffuseLight>,
-    /// Eye, in entity space.
+    /// Camera position, entity space.
     pub viewer: Vec3,
-    /// Eye in the space that `alphaGen portal` measures in: the world, for the world's own surfaces.
-    pub portal_eye: Vec3,
+    /// Camera position in the space that `alphaGen portal` measures in: the world, for the world's own surfaces.
+    pub portal_camera: Vec3,
 }
 
 impl Default for ColorContext {
-    /// Time 0, no overbright, a white entity without light, the eye at the origin.
+    /// Time 0, no overbright, a white entity without light, the camera at the origin.
     fn default() -> Self {
         ColorContext {
             time: 0.0,
@@ -41,7 +41,7 @@ impl Default for ColorContext {
             entity: [255; 4],
             light: None,
             viewer: Vec3::ZERO,
-            portal_eye: Vec3::ZERO,
+            portal_camera: Vec3::ZERO,
         }
     }
 }
@@ -113,7 +113,7 @@ pub fn alpha_gen(
         AlphaGen::OneMinusVertex => 255 - vertex[3],
         AlphaGen::LightingSpecular => specular_alpha(position, normal, context.viewer),
         AlphaGen::Portal { range } => {
-            let distance = position.distance(context.portal_eye) / range;
+            let distance = position.distance(context.portal_camera) / range;
             if distance < 0.0 {
                 0
             } else if distance > 1.0 {

@@ -9,7 +9,7 @@ const MIN_STRETCH: f32 = 1e-6;
 
 /// Texture coordinates of a stage at a vertex, before `tcMod`s.
 ///
-/// `st` and `lightmap` are the vertex's own; `position`, `normal` and `viewer` (the eye) are in entity space.
+/// `st` and `lightmap` are the vertex's own; `position`, `normal` and `viewer` (the camera) are in entity space.
 pub fn tex_coord(
     tc_gen: &TcGen,
     st: Vec2,

@@ -125,7 +125,7 @@ impl Board {
     }
 
     /// Where the camera stands so that all tiles are seen.
-    pub fn eye(&self) -> Vec3 {
+    pub fn camera(&self) -> Vec3 {
         let rows = self.tiles.len().div_ceil(self.columns);
         let half = (self.columns as f32).max(rows as f32 * 4.0 / 3.0) * STEP / 2.0;
         Vec3::new(-half, 0.0, 0.0)
@@ -152,7 +152,7 @@ impl Board {
             let down = row as f32 / 127.0;
             [across, down, 1.0 - across].map(|v| (8.0 + 56.0 * v) as u8)
         });
-        let reach = self.eye().x.abs() + 160.0;
+        let reach = self.camera().x.abs() + 160.0;
         map.add_room(
             wall,
             Vec3::new(-reach, -reach, -reach),
@@ -263,7 +263,7 @@ impl Board {
 
     /// The camera before the board.
     pub fn view(&self, stage: &Stage) -> View {
-        stage.view(self.eye(), 0.0)
+        stage.view(self.camera(), 0.0)
     }
 
     /// Loads the map and keeps pictures at times, milliseconds after the scene's beginning.
@@ -348,7 +348,7 @@ impl Board {
 
     /// Draws the 2D pictures where their tiles are seen.
     pub fn draw_pictures(&self, engine: &mut Engine, view: &View) -> Result<(), Raised> {
-        let scale = view.width as f32 / 2.0 / self.eye().x.abs();
+        let scale = view.width as f32 / 2.0 / self.camera().x.abs();
         for tile in self.of(Shape::Picture) {
             let shader = self.shader(engine, tile)?;
             let center = self.center(tile);

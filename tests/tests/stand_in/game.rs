@@ -65,7 +65,7 @@ fn map_names(engine: &Engine) -> Vec<String> {
     names
 }
 
-/// Where the first player may start, eyes included.
+/// Where the first player may start, camera included.
 fn spawn(engine: &mut Engine) -> Vec3 {
     let mut tokens = Vec::new();
     while let Some(token) = engine.entity_token().unwrap() {

@@ -70,7 +70,7 @@ pub struct Stage {
     pub stand: bool,
 }
 
-/// Where a model in the hands is, units forward, to the left and up of the eye: about where games put it.
+/// Where a model in the hands is, units forward, to the left and up of the camera: about where games put it.
 const HELD_AT: Vec3 = Vec3::new(12.0, -5.0, -7.0);
 
 impl Stage {

@@ -169,8 +169,8 @@ impl Nodes {
         node.insert("name".into(), json!(format!("{name}_camera")));
         node.insert("camera".into(), json!(self.cameras.len() - 1));
         if !intermission {
-            let eyes = viewpoints::SPAWN_LIFT + viewpoints::EYE_HEIGHT;
-            put_translation(&mut node, Vec3::Y * (eyes * scale));
+            let height = viewpoints::SPAWN_LIFT + viewpoints::VIEW_HEIGHT;
+            put_translation(&mut node, Vec3::Y * (height * scale));
         }
         put_rotation(&mut node, turned);
         Some(self.add(Value::Object(node)))

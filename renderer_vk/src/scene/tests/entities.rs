@@ -67,7 +67,7 @@ fn models_are_lerped_and_placed() {
         game.materials.get(views[0].meshes[0].material).name,
         "t/wall"
     );
-    // behind the eye
+    // behind the camera
     scene.add_entity(&RefEntity {
         origin: Vec3::new(-500.0, 0.0, 0.0),
         ..moving
@@ -144,7 +144,7 @@ fn persons_show_where_they_should() {
 }
 
 #[test]
-fn what_turns_to_the_eye_turns_to_mirrors_too() {
+fn surfaces_that_face_the_camera_face_it_in_mirrors_too() {
     let mut game = game();
     let world = room(&mut game);
     let sprite = |renderfx| RefEntity {

@@ -33,7 +33,7 @@ fn the_world_in_sight_is_sorted_and_culled() {
     // the far plane is at the farthest corner
     let farthest = Vec3::new(356.0, 256.0, 256.0).length();
     assert!((view.view.far - farthest).abs() < 2.0, "{}", view.view.far);
-    // the sprite faces the eye
+    // the sprite faces the camera
     let first = view.meshes[0].first_vertex as usize;
     assert!(
         view.vertices[first..first + 4]

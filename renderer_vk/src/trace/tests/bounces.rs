@@ -59,8 +59,8 @@ pub(super) fn seen(glow: f32, albedo: f32, light: f32) -> f32 {
 
 /// A room whose walls glow with 0.25 and reflect `albedo`; their stored light is scaled by `scale`.
 pub(super) fn furnace(albedo: f32, scale: f32) -> Scene {
-    let eye = Vec3::new(-20.0, 10.0, 5.0);
-    let mut scene = Scene::new(eye, Vec3::new(50.0, 20.0, -30.0), 90.0, 32);
+    let camera = Vec3::new(-20.0, 10.0, 5.0);
+    let mut scene = Scene::new(camera, Vec3::new(50.0, 20.0, -30.0), 90.0, 32);
     let glow = stage::add([encode(0.25); 3]);
     let stages = [stage::light(), stage::filter([encode(albedo); 3]), glow];
     let wall = scene.material(&stages, 0);
@@ -71,8 +71,8 @@ pub(super) fn furnace(albedo: f32, scale: f32) -> Scene {
 
 /// A white floor before a wall of some color (encoded) at x = 0 that faces -x, and the wall's corners.
 pub(super) fn floor_before_a_wall(color: [f32; 3]) -> (Scene, [Vec3; 4]) {
-    let eye = Vec3::new(-60.0, 0.0, 40.0);
-    let mut scene = Scene::new(eye, Vec3::new(-40.0, 0.0, 0.0), 4.0, 32);
+    let camera = Vec3::new(-60.0, 0.0, 40.0);
+    let mut scene = Scene::new(camera, Vec3::new(-40.0, 0.0, 0.0), 4.0, 32);
     let white = scene.diffuse(1.0);
     let painted = scene.material(&[stage::light(), stage::filter(color)], 0);
     scene.quad(floor_at(0.0, 500.0), white);
@@ -134,8 +134,8 @@ fn gloss_throws_back_what_its_picture_shows(gpu: &mut Gpu) {
     let texels: Vec<u8> = [40u8, 216].iter().flat_map(|&v| [v, v, v, 255]).collect();
     let texels = [texels.clone(), texels].concat();
     let picture = square(gpu, 2, &texels);
-    let eye = Vec3::new(0.0, 0.0, 2.0);
-    let mut scene = Scene::new(eye, Vec3::new(0.1, 0.0, 0.0), 30.0, 16);
+    let camera = Vec3::new(0.0, 0.0, 2.0);
+    let mut scene = Scene::new(camera, Vec3::new(0.1, 0.0, 0.0), 30.0, 16);
     scene.images.push(picture.texture_index());
     let stages = [
         stage::constant([0.0; 3]),

@@ -13,7 +13,7 @@ use crate::trace::frame_lights::decode;
 
 gpu_tests! {
     each: [
-        cut_outs_have_holes_for_eyes_and_shadows,
+        cut_outs_have_holes_for_camera_and_shadow_rays,
         paint_with_holes_lets_its_wall_through,
     ],
 }
@@ -31,7 +31,7 @@ pub(super) fn stripes(gpu: &Gpu, texels: [[u8; 4]; 2]) -> Image {
     image
 }
 
-fn cut_outs_have_holes_for_eyes_and_shadows(gpu: &mut Gpu) {
+fn cut_outs_have_holes_for_camera_and_shadow_rays(gpu: &mut Gpu) {
     let image = stripes(gpu, [[255; 4], [255, 255, 255, 0]]);
     // left half white and solid, right half transparent
     let mut scene = scene();
@@ -60,7 +60,7 @@ fn cut_outs_have_holes_for_eyes_and_shadows(gpu: &mut Gpu) {
     let mut stripes = stage::image(0);
     stripes.alpha_func = c::ALPHAFUNC_GE128;
     let grate = scene.material(&[stripes], c::MATERIAL_CUT_OUT | c::MATERIAL_TWO_SIDED);
-    // above the eye; s runs along x: the hole is at x > 0
+    // above the camera; s runs along x: the hole is at x > 0
     scene.quad(floor_at(60.0, 100.0), grate);
     scene.sun(Vec3::Z, std::f32::consts::PI, 0.001);
     let (pixels, _) = gpu.render(&scene, &reference(), 2);

@@ -114,8 +114,8 @@ fn fogged(length: f32, shown: Vec3) -> Vec3 {
 
 /// A wall at x = 300, perpendicular to the view; it and the camera are below the fog's surface.
 fn wall_behind_fog() -> Scene {
-    let eye = Vec3::new(0.0, 0.0, 50.0);
-    let mut scene = Scene::new(eye, eye + Vec3::X * 100.0, 1.0, 4);
+    let camera = Vec3::new(0.0, 0.0, 50.0);
+    let mut scene = Scene::new(camera, camera + Vec3::X * 100.0, 1.0, 4);
     let wall = scene.material(&[stage::constant(BACK)], 0);
     scene.quad(screen(300.0), wall);
     scene.fogs.push(slab(c::FOG_SURFACE, 250.0));
@@ -213,14 +213,14 @@ fn clouds_are_behind_the_fog_that_their_sky_is_stored_with(gpu: &mut Gpu) {
         cloud_height: 512.0,
     };
     // below the fog's surface, including cells on a side of the sky box below it
-    let (eye, at) = (
+    let (camera, at) = (
         Vec3::new(150.0, 0.0, 20.0),
         Vec3::new(250.0, 0.0, 20.0 - 37.5),
     );
     // the engine draws clouds on a box at the far plane's distance / 1.75
-    let distance = Scene::new(eye, at, 1.0, 4).view().view.sky_distance();
+    let distance = Scene::new(camera, at, 1.0, 4).view().view.sky_distance();
     let depth = 3.0 * distance;
-    let cover = ((at - eye).length() / (at.x - eye.x) * distance / depth).sqrt();
+    let cover = ((at - camera).length() / (at.x - camera.x) * distance / depth).sqrt();
     let (veil, alpha) = ([0.1, 0.9, 0.1], 127.0 / 255.0);
     let left = 1.0 - cover;
     for (clouds, exact) in [
@@ -231,7 +231,7 @@ fn clouds_are_behind_the_fog_that_their_sky_is_stored_with(gpu: &mut Gpu) {
             displayed(veil) * (alpha * left) * left,
         ),
     ] {
-        let mut scene = Scene::new(eye, at, 1.0, 4);
+        let mut scene = Scene::new(camera, at, 1.0, 4);
         let sky = scene.sky(&[clouds], record);
         scene.room(Vec3::splat(-300.0), Vec3::splat(300.0), sky);
         for surface in &mut scene.surfaces {

@@ -101,8 +101,8 @@ fn only_rays_near_something_translucent_ask_for_layers(gpu: &mut Gpu) {
             scene.quad(points, pane);
         }
         gpu.render(&scene, &settings, 4);
-        let [eye, primary, ..] = gpu.rays().expect("counted");
-        eye + primary
+        let [primary_rays, primary, ..] = gpu.rays().expect("counted");
+        primary_rays + primary
     };
     for moves in [false, true] {
         // a part of the picture

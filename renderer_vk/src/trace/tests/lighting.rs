@@ -161,7 +161,7 @@ fn an_umbra_is_black_and_a_penumbra_is_between(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::new(0.0, 0.0, 90.0), Vec3::ZERO, 80.0, 32);
     let white = scene.diffuse(1.0);
     scene.quad(floor_at(0.0, 500.0), white);
-    // between light and floor, above the eye
+    // between light and floor, above the camera
     scene.quad(ceiling_at(100.0, 20.0), white);
     scene.light(triangle, Vec3::splat(1000.0));
     let (pixels, _) = gpu.render(&scene, &sampled(LightSampling::All), 16);

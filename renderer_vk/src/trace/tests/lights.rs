@@ -15,7 +15,7 @@ gpu_tests! {
         an_edge_hides_the_part_of_a_light_that_lies_behind_it,
         the_suns_disc_makes_a_penumbra_of_its_own_width,
         in_a_furnace_of_sky_a_white_floor_is_as_bright_as_the_sky,
-        the_flashlight_lights_a_spot_before_the_eye,
+        the_flashlight_lights_a_spot_before_the_camera,
         estimators_differ_by_noise_alone,
         a_chosen_ray_goes_where_it_was_sent,
         errors_fall_faster_than_those_of_independent_frames,
@@ -37,7 +37,7 @@ fn floor_from_above(half: f32) -> Scene {
     scene
 }
 
-/// The same below a ceiling at a height of 150 units, above the eye, that covers x < 0.
+/// The same below a ceiling at a height of 150 units, above the camera, that covers x < 0.
 fn floor_below_an_edge() -> Scene {
     let mut scene = floor_from_above(40.0);
     let white = scene.diffuse(1.0);
@@ -191,7 +191,7 @@ fn in_a_furnace_of_sky_a_white_floor_is_as_bright_as_the_sky(gpu: &mut Gpu) {
     }
 }
 
-fn the_flashlight_lights_a_spot_before_the_eye(gpu: &mut Gpu) {
+fn the_flashlight_lights_a_spot_before_the_camera(gpu: &mut Gpu) {
     let scene = floor_from_above(80.0);
     assert_eq!(gpu.mean(&scene, &all_lights(), 1), Vec3::ZERO);
     let settings = Settings {

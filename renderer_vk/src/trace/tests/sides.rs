@@ -10,7 +10,7 @@ use crate::settings::Settings;
 gpu_tests! {
     each: [
         light_passes_what_the_compiler_let_it_pass,
-        the_eye_sees_the_shown_side_alone,
+        the_camera_sees_the_shown_side_alone,
     ],
 }
 
@@ -101,7 +101,7 @@ fn light_passes_what_the_compiler_let_it_pass(gpu: &mut Gpu) {
     }
 }
 
-fn the_eye_sees_the_shown_side_alone(gpu: &mut Gpu) {
+fn the_camera_sees_the_shown_side_alone(gpu: &mut Gpu) {
     for (corners, flags, world) in [
         (screen(90.0), c::MATERIAL_PASSED, true),
         (turned_away(90.0), BACK | c::MATERIAL_PASSED, true),

@@ -16,7 +16,7 @@ use crate::trace::input::Tracer;
 
 gpu_tests! {
     any: [
-        a_mirror_shows_what_is_behind_the_eye_and_who_looks,
+        a_mirror_shows_what_is_behind_the_camera_and_the_player,
         camera_facing_copies_are_hit_only_by_their_own_paths,
         back_faces_do_not_show,
         of_two_faces_in_one_plane_the_one_that_shows_is_met,
@@ -64,7 +64,7 @@ fn screen(x: f32) -> [Vec3; 4] {
     }
 }
 
-fn a_mirror_shows_what_is_behind_the_eye_and_who_looks(gpu: &mut Gpu) {
+fn a_mirror_shows_what_is_behind_the_camera_and_the_player(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
     let red = scene.material(&[stage::constant(RED)], 0);
     // a clean mirror: its single stage passes half of the reflection
@@ -76,7 +76,7 @@ fn a_mirror_shows_what_is_behind_the_eye_and_who_looks(gpu: &mut Gpu) {
     let byte = |v: f32| (v * 255.0 + 0.001).floor() / 255.0;
     let half = |color: [f32; 3]| decode(Vec3::from(color.map(byte)) * byte(encode(0.5)));
     shows(gpu, &scene, half(RED));
-    // the body of the one who looks shows in the mirror, the weapon before the eye does not
+    // the mirror shows the body of the player, the weapon before the camera does not
     let green = scene.material(&[stage::constant(GREEN)], 0);
     let blue = scene.material(&[stage::constant(BLUE)], 0);
     let body = Instance {

@@ -217,8 +217,8 @@ fn transport(rec: &mut Recorder, traced: &TracedView<'_>) -> Result<TransportVie
     } else {
         0.0
     };
-    let eye = camera_frame(view).origin;
-    let beyond = Beyond::of(view, eye, lens, geometry, materials);
+    let camera = camera_frame(view).origin;
+    let beyond = Beyond::of(view, camera, lens, geometry, materials);
     Ok(TransportView {
         filters: geometry.map_or(0, |g| g.surroundings.filters()),
         filter_count: geometry.map_or(0, |g| g.surroundings.filter_count()),

@@ -108,7 +108,7 @@ pub(super) fn rails(stage: &mut Stage) -> Result<(), Raised> {
         });
         stage.keep_entities(name, &view, &all)?;
     }
-    // from behind its start, so that some of it lies behind the eye
+    // from behind its start, so that some of it lies behind the camera
     let view = stage.view(Vec3::new(-20.0, 100.0, -30.0), -80.0);
     let all = [RAIL_CORE, RAIL_RINGS, LIGHTNING].map(|kind| refEntity_t {
         customShader: add,

@@ -51,9 +51,9 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// An empty scene with a camera: at `eye`, looking at `target`, `fov` degrees wide, square.
-    pub fn new(eye: Vec3, target: Vec3, fov: f32, size: i32) -> Self {
-        let forward = (target - eye).normalize();
+    /// An empty scene with a camera: at `camera`, looking at `target`, `fov` degrees wide, square.
+    pub fn new(camera: Vec3, target: Vec3, fov: f32, size: i32) -> Self {
+        let forward = (target - camera).normalize();
         let aside = if forward.z.abs() > 0.99 {
             Vec3::Y
         } else {
@@ -91,7 +91,7 @@ impl Scene {
                 height: size,
                 fov_x: fov,
                 fov_y: fov,
-                view_origin: eye,
+                view_origin: camera,
                 view_axis: [forward, aside, forward.cross(aside)],
                 ..RefDef::default()
             },
@@ -100,8 +100,8 @@ impl Scene {
 
     /// A hall with two walls for shadows in it, seen from `height` units above its middle.
     pub fn hall(height: f32, albedo: f32, size: i32) -> Self {
-        let eye = Vec3::new(-180.0, 0.0, height);
-        let mut scene = Self::new(eye, Vec3::new(100.0, 0.0, -20.0), 70.0, size);
+        let camera = Vec3::new(-180.0, 0.0, height);
+        let mut scene = Self::new(camera, Vec3::new(100.0, 0.0, -20.0), 70.0, size);
         let grey = scene.diffuse(albedo);
         let far = Vec3::new(200.0, 150.0, 120.0);
         scene.room(Vec3::new(-200.0, -150.0, -80.0), far, grey);
