@@ -1,4 +1,4 @@
-//! A folder of cached results, such as calibrations.
+//! The folder of cached results on disk, for calibrations and swept light lists: file names, keys, atomic writes.
 //!
 //! The file name is the hash of everything that a result depends on, so a file is either current or absent.
 

@@ -36,7 +36,6 @@
 
 mod apply;
 mod bounce;
-mod cache;
 mod candidate_grid;
 mod columns;
 mod compiler;
@@ -51,6 +50,7 @@ mod recovery;
 mod report;
 mod residual_candidates;
 mod residuals;
+mod result_cache;
 mod sample_soa;
 mod samples;
 mod skies;
@@ -63,6 +63,7 @@ mod suns;
 mod tests;
 mod texels;
 mod trace_cache;
+mod triangle_lights;
 mod triangulation;
 mod vertices;
 
@@ -164,11 +165,14 @@ pub fn calibrate_with(
     progress: &mut dyn FnMut(f32),
 ) -> CalibrationReport {
     let begin = Instant::now();
-    let key = options.cache.as_ref().map(|_| cache::key(world, options));
+    let key = options
+        .cache
+        .as_ref()
+        .map(|_| result_cache::key(world, options));
     let unknown_skies = skies::unknown_skies(world);
     skies::open(world, &unknown_skies);
     let kept = match (&options.cache, key) {
-        (Some(cache), Some(key)) => cache::read(cache, key, columns::count(world)),
+        (Some(cache), Some(key)) => result_cache::read(cache, key, columns::count(world)),
         _ => Ok(None),
     };
     let mut solution = match kept {
@@ -183,7 +187,7 @@ pub fn calibrate_with(
             let solution = hypotheses::best(world, &unknown_skies, options, progress);
             progress(1.0);
             if let (Some(cache), Some(key)) = (&options.cache, key)
-                && let Err(problem) = cache::write(cache, key, &solution)
+                && let Err(problem) = result_cache::write(cache, key, &solution)
             {
                 world.warnings.push(problem.to_string());
             }

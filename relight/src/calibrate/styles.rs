@@ -9,7 +9,7 @@
 use super::Acceptance;
 use super::compiler::Compiler;
 use super::trace_cache::TraceCache;
-use super::{CalibrationOptions, FitMode, Solution, apply, cache, find};
+use super::{CalibrationOptions, FitMode, Solution, apply, find, result_cache};
 use crate::emitters::Evidence;
 use crate::light::{self, PointLight, Pulse};
 use crate::overbright::MAP_OVERBRIGHT_BITS;
@@ -94,9 +94,9 @@ fn solve(world: &mut RelitWorld, options: &CalibrationOptions, number: usize) ->
     let key = options.cache.as_ref().map(|cache| {
         let mut hash = Hash::new();
         hash.number(number as u64);
-        (cache, cache::key_from(hash, world, options))
+        (cache, result_cache::key_from(hash, world, options))
     });
-    let kept = key.map_or(Ok(None), |(cache, key)| cache::read(cache, key, 0));
+    let kept = key.map_or(Ok(None), |(cache, key)| result_cache::read(cache, key, 0));
     match kept {
         Ok(Some(solution)) => return Some(solution),
         Ok(None) => {}
@@ -124,7 +124,7 @@ fn solve(world: &mut RelitWorld, options: &CalibrationOptions, number: usize) ->
         &mut |_| (),
     )?;
     if let Some((cache, key)) = key
-        && let Err(problem) = cache::write(cache, key, &solution)
+        && let Err(problem) = result_cache::write(cache, key, &solution)
     {
         world.warnings.push(problem.to_string());
     }

@@ -1,5 +1,5 @@
-//! Rays shared between the fits of one world: samples, transfer matrices and candidate rows. Most fits use the same
-//! ones.
+//! Results of rays in memory, shared between the fits of one world: samples, transfer matrices and candidate rows. Most
+//! fits use the same ones.
 
 use super::Evidence;
 use super::bounce::Transfer;

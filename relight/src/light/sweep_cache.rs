@@ -1,4 +1,4 @@
-//! Cache of swept light lists, in the folder of the calibrations.
+//! Swept light lists in files of the cache folder, beside the calibrations.
 //!
 //! The file name is the hash of everything that the lists depend on: the map's bytes, its lights' geometry and
 //! powers, the lists before the sweep, and [`VERSION`]. So a file is either current or absent; a damaged or foreign

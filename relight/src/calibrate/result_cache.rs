@@ -1,4 +1,4 @@
-//! Cached calibration results.
+//! Calibration results in files of the cache folder.
 //!
 //! The file name is the hash of everything that the result depends on, so a file is either current or absent. A file
 //! of another version counts as absent; so does a damaged file, which gives a warning.
