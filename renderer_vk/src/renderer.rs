@@ -27,8 +27,8 @@ use crate::settings::{Anaglyph, Settings};
 use crate::stereo::Eye;
 use crate::targets::FrameTargets;
 use crate::trace::TraceLook;
-use crate::trace::input::Tracer;
 use crate::trace::pass_set::PassSet;
+use crate::trace::tracer::Tracer;
 use crate::world::{EntityTokens, Marker, World};
 
 use held::HeldViews;

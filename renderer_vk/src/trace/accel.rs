@@ -15,9 +15,10 @@ use support::slice;
 
 use super::bvh::{INSTANCES, build_triangles, widen};
 use super::geometry::{StaticGeometry, StaticPart, Structure};
-use super::input::{Kind, MaterialTable, Tracer};
+use super::input::{Kind, MaterialTable};
 use super::parts::{Parts, Seen, Slot, axes, is_solid};
 use super::shapes::{Bottom, OwnBottom, Shapes};
+use super::tracer::Tracer;
 use crate::gpu::{
     self, Access, Blas, BlasBuild, BlasFlags, BlasGeometry, Device, Error, Recorder, Tlas,
 };

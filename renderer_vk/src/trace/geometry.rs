@@ -15,10 +15,11 @@ use super::beyond_sky::MapSkies;
 use super::bvh::build_triangles;
 use super::cutout::Coverage;
 use super::doubled::doubled;
-use super::input::{Kind, MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
+use super::input::{Kind, MaterialInfo, MaterialTable, StaticScene, StaticSurface};
 use super::layer_boxes::{StaticLayer, bounds_of};
 use super::lifted::lifted;
 use super::surroundings::Surroundings;
+use super::tracer::Tracer;
 use crate::gpu::{Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error};
 
 /// Triangles of one kind.

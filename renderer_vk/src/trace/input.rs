@@ -8,68 +8,6 @@ use shaders::types::{Fog, MaterialBuffers, Vertex};
 use support::slice::{part, span};
 
 use super::cutout::Coverage;
-use crate::gpu::DeviceInfo;
-use crate::settings::TracerChoice;
-
-/// Method of tracing rays.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tracer {
-    /// The device's ray tracing pipeline.
-    Pipeline,
-    /// The device's ray queries, in compute shaders.
-    Query,
-    /// Our own hierarchies in compute shaders: on any device, and faster on devices that trace in software.
-    Compute,
-}
-
-impl Tracer {
-    /// Whether a device supports this tracer.
-    pub fn is_possible(self, info: &DeviceInfo) -> bool {
-        match self {
-            Self::Pipeline => info.ray_tracing.is_some(),
-            Self::Query => info.ray_query,
-            Self::Compute => true,
-        }
-    }
-
-    /// The tracer of the setting; if the device does not support it, the fastest supported one, with a warning.
-    pub fn of(info: &DeviceInfo, wish: TracerChoice) -> Self {
-        let possible = |tracer: Self| tracer.is_possible(info);
-        let found = Self::choose(wish, info.software, possible);
-        if let Some(wished) = Self::wished(wish).filter(|wished| *wished != found) {
-            let name = match wished {
-                Self::Pipeline => "ray tracing pipelines",
-                Self::Query => "ray queries",
-                Self::Compute => "compute",
-            };
-            log::warn!("rt_tracer: {} has no {name}; {found:?} is used", info.name);
-        }
-        found
-    }
-
-    fn wished(wish: TracerChoice) -> Option<Self> {
-        match wish {
-            TracerChoice::Auto => None,
-            TracerChoice::Pipeline => Some(Self::Pipeline),
-            TracerChoice::Query => Some(Self::Query),
-            TracerChoice::Compute => Some(Self::Compute),
-        }
-    }
-
-    /// The wished tracer if possible, otherwise the fastest by measurement: on devices that trace in software, our own
-    /// hierarchies. Devices with ray tracing hardware offer ray queries; drivers without such hardware (NVIDIA's for
-    /// Pascal, Volta and compute devices) offer ray tracing pipelines only.
-    fn choose(wish: TracerChoice, software: bool, possible: impl Fn(Self) -> bool) -> Self {
-        let by_programs = software || (possible(Self::Pipeline) && !possible(Self::Query));
-        let fastest = [Self::Pipeline, Self::Query].map(|tracer| (!by_programs).then_some(tracer));
-        [Self::wished(wish)]
-            .into_iter()
-            .chain(fastest)
-            .flatten()
-            .find(|tracer| possible(*tracer))
-            .unwrap_or(Self::Compute)
-    }
-}
 
 /// How rays treat a material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -78,7 +16,7 @@ pub enum Kind {
     Opaque,
     /// Stops a ray where its alpha test passes.
     Tested,
-    /// Rays pass it; its colour is composed over the surface behind.
+    /// Camera rays composite its colour over the surface behind; casts no shadow unless its material filters light.
     Translucent,
     /// Shows the sky.
     Sky,
@@ -219,36 +157,5 @@ impl StaticScene<'_> {
         indices
             .iter()
             .filter_map(|&i| self.vertices.get(i as usize))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_unsupported_tracer_falls_back_to_the_fastest() {
-        use Tracer::{Compute, Pipeline, Query};
-        use TracerChoice as W;
-        let (none, both) = (&[Compute][..], &[Pipeline, Query, Compute]);
-        let (query, pipeline) = (&[Query, Compute], &[Pipeline, Compute]);
-        for (device, software, wish, found) in [
-            (none, false, W::Auto, Compute),
-            (none, false, W::Pipeline, Compute),
-            (none, false, W::Query, Compute),
-            (both, false, W::Auto, Pipeline),
-            (both, false, W::Query, Query),
-            (both, false, W::Compute, Compute),
-            (query, false, W::Auto, Query),
-            (query, false, W::Pipeline, Query),
-            (pipeline, false, W::Auto, Compute),
-            (pipeline, false, W::Pipeline, Pipeline),
-            (both, true, W::Auto, Compute),
-            (both, true, W::Pipeline, Pipeline),
-            (none, true, W::Pipeline, Compute),
-        ] {
-            let chosen = Tracer::choose(wish, software, |tracer| device.contains(&tracer));
-            assert_eq!(chosen, found, "{wish:?} of {device:?}");
-        }
     }
 }

@@ -13,11 +13,12 @@ use super::accel::AccelMemory;
 use super::cutout::{Coverage, coverage};
 use super::fog_light;
 use super::geometry::StaticGeometry;
-use super::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
+use super::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface};
 use super::lights::{MapLightSource, MapLights};
 use super::pass_set::PassSet;
 use super::passes::counter_of;
 use super::surroundings::Surroundings;
+use super::tracer::Tracer;
 use super::view_tracer::{TracedMap, TracedView, ViewTracer};
 use relight::light::Occlusion;
 

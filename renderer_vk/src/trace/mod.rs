@@ -43,6 +43,7 @@ mod shapes;
 pub mod still;
 pub mod surroundings;
 pub mod targets;
+pub mod tracer;
 pub mod view_tracer;
 
 pub use look::{MapView, TraceLook};

@@ -2,8 +2,8 @@
 
 use std::sync::OnceLock;
 
-use super::input::Tracer;
 use super::passes::{Pass, Shader, Switch, TABLE};
+use super::tracer::Tracer;
 use crate::at_once::{Late, Make, make_all};
 use crate::gpu::{ComputePipeline, Device, Error, HitGroup, RayTracingDesc, RayTracingPipeline};
 

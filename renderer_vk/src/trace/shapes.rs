@@ -14,9 +14,9 @@ use shaders::types::{Triangle, Vertex};
 use support::Aabb;
 use support::slice;
 
-use super::input::Tracer;
 use super::part_mesh::{MeshPart, members};
 use super::parts::{Part, Parts, ShapeMesh, SkinMesh};
+use super::tracer::Tracer;
 use crate::gpu::{BlasBuild, Buffer, BufferUsage, CompactedSizes, Device, Error, Pass, Recorder};
 use crate::scene::TracedScene;
 

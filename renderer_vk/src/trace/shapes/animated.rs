@@ -13,8 +13,9 @@ use support::Aabb;
 use support::bvh::Hierarchy;
 
 use super::super::bvh::{TRIANGLES, ordered, widen};
-use super::super::input::{Kind, Tracer};
+use super::super::input::Kind;
 use super::super::part_mesh::{MeshPart, geometry, is_same, part_indices};
+use super::super::tracer::Tracer;
 use super::{Bottom, OwnBottom};
 use crate::gpu::{
     Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error, Recorder,

@@ -3,8 +3,9 @@
 use shaders::types::Vertex;
 
 use super::super::bvh::build_triangles;
-use super::super::input::{Kind, Tracer};
+use super::super::input::Kind;
 use super::super::part_mesh::{MeshPart, geometry, part_corners, part_indices};
+use super::super::tracer::Tracer;
 use super::{Bottom, OwnBottom};
 use crate::gpu::{
     Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error, Pass,

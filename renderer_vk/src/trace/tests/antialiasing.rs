@@ -10,7 +10,7 @@ use super::harness::{Gpu, Scene, identity, mirror_at, rectangle, reference, stag
 use crate::api::RefDef;
 use crate::scene::TracedScene;
 use crate::settings::{DenoiserChoice, Settings};
-use crate::trace::input::Tracer;
+use crate::trace::tracer::Tracer;
 
 const SIZE: i32 = 64;
 /// Frames accumulated for a reference picture: its standard error is one sixteenth of a single sample's.

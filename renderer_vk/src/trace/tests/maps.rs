@@ -17,8 +17,8 @@ use crate::raster::FlareTest;
 use crate::scene::{GatherInput, Scene};
 use crate::settings::{Settings, TracerChoice};
 use crate::test_support::openarena;
-use crate::trace::input::Tracer;
 use crate::trace::pass_set::PassSet;
+use crate::trace::tracer::Tracer;
 use crate::trace::{MapView, TraceLook};
 use crate::world::World;
 

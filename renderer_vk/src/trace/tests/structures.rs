@@ -11,7 +11,7 @@ use super::harness::{Gpu, Scene, gpu_tests, identity, reference, stage};
 use crate::scene::{DynamicMesh, MeshId, RigidMesh, Shape};
 use crate::settings::Settings;
 use crate::trace::accel::Accel;
-use crate::trace::input::Tracer;
+use crate::trace::tracer::Tracer;
 
 gpu_tests! {
     each: [

@@ -6,7 +6,7 @@ use testkit::Random;
 use super::harness::{Gpu, Scene, floor_at, reference, stage};
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
 use crate::settings::Settings;
-use crate::trace::input::Tracer;
+use crate::trace::tracer::Tracer;
 
 /// Texels on each side of the image.
 const SIDE: u32 = 256;

@@ -12,7 +12,7 @@ use super::harness::{
 use crate::scene::Portal;
 use crate::settings::Settings;
 use crate::trace::frame_lights::decode;
-use crate::trace::input::Tracer;
+use crate::trace::tracer::Tracer;
 
 gpu_tests! {
     any: [

@@ -15,9 +15,9 @@ use crate::gpu::{
 use crate::raster::FlareTest;
 use crate::scene::{TracedScene, View};
 use crate::settings::Settings;
-use crate::trace::input::Tracer;
 use crate::trace::pass_set::PassSet;
 use crate::trace::passes::COUNTERS;
+use crate::trace::tracer::Tracer;
 use crate::trace::view_tracer::{TracedMap, TracedView, ViewTracer};
 
 /// The tests of a file, in its module `on_gpu`: a `#[test]` for each named function of the file, which takes a

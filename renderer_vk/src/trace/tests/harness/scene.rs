@@ -16,9 +16,10 @@ use crate::scene::{
     DynamicMesh, Portal, RigidMesh, Shape, Submodel, TracedPart, TracedScene, View, ViewEntity,
 };
 use crate::trace::geometry::StaticGeometry;
-use crate::trace::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
+use crate::trace::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface};
 use crate::trace::lights::{MapLightSource, MapLights};
 use crate::trace::surroundings::Surroundings;
+use crate::trace::tracer::Tracer;
 
 /// A scene built in code.
 pub struct Scene {
