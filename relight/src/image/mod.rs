@@ -122,14 +122,15 @@ impl Image {
         }
     }
 
+    /// A picture of at least one pixel; `texel`: colour at a column and row.
+    pub fn generate(width: u32, height: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> Image {
+        let at = |i| texel(i % width, i / width);
+        Image::of(width, height, (0..width * height).flat_map(at).collect())
+    }
+
     /// A picture of one colour, 1 × 1.
     pub fn uniform(rgba: [u8; 4]) -> Image {
-        Image {
-            width: 1,
-            height: 1,
-            rgba: rgba.to_vec(),
-            has_alpha: rgba[3] != 255,
-        }
+        Image::of(1, 1, rgba.to_vec())
     }
 
     /// The pixels, row by row from the top.
@@ -213,33 +214,25 @@ pub fn find(files: &dyn GameFiles, name: &str) -> Option<String> {
         .find(|file| files.exists(file))
 }
 
-/// The engine's built-in images that scripts can name: `*white`, 8 × 8, and `*default`, 16 × 16 dark grey with a
-/// white border, which marks what is missing.
+/// The engine's built-in images that scripts can name: `*white`, 8 × 8, and `*default`, here opaque.
 pub fn built_in(name: &str) -> Option<Image> {
-    const WHITE: [u8; 4] = [255; 4];
-    const DARK: [u8; 4] = [32, 32, 32, 255];
-    let picture = |side: u32, texel: &dyn Fn(u32, u32) -> [u8; 4]| {
-        let rgba = (0..side * side)
-            .flat_map(|i| texel(i % side, i / side))
-            .collect();
-        Image {
-            width: side,
-            height: side,
-            rgba,
-            has_alpha: false,
-        }
-    };
     match name {
-        "*white" => Some(picture(8, &|_, _| WHITE)),
-        "*default" => Some(picture(16, &|x, y| {
-            if matches!(x, 0 | 15) || matches!(y, 0 | 15) {
-                WHITE
-            } else {
-                DARK
-            }
-        })),
+        "*white" => Some(Image::generate(8, 8, |_, _| [255; 4])),
+        "*default" => Some(default_image(255)),
         _ => None,
     }
+}
+
+/// The image of missing textures, `*default`: 16 × 16, dark grey with a white border. `alpha`: of the grey; 32 in the
+/// engine.
+pub fn default_image(alpha: u8) -> Image {
+    Image::generate(16, 16, |x, y| {
+        if matches!(x, 0 | 15) || matches!(y, 0 | 15) {
+            [255; 4]
+        } else {
+            [32, 32, 32, alpha]
+        }
+    })
 }
 
 fn known(extension: &str) -> bool {

@@ -234,20 +234,9 @@ fn hue(brightness: f32) -> [u8; 3] {
     [0.0, 2.0, 4.0].map(|centre| (channel(centre) * 0.5 * 255.0) as u8)
 }
 
-/// The 16 x 16 image of missing textures: dark grey with a white border.
-pub fn default_picture() -> Image {
-    picture((16, 16), |x, y| {
-        if x == 0 || y == 0 || x == 15 || y == 15 {
-            [255; 4]
-        } else {
-            [32, 32, 32, 32]
-        }
-    })
-}
-
 /// The 16 x 16 image of a dynamic light: falls off with the square of the distance from its centre.
 pub fn dynamic_light_picture() -> Image {
-    picture((16, 16), |x, y| {
+    Image::generate(16, 16, |x, y| {
         let (dx, dy) = (7.5 - x as f32, 7.5 - y as f32);
         let brightness = (4000.0 / (dx * dx + dy * dy)).min(255.0);
         let byte = if brightness < 75.0 {
@@ -264,7 +253,7 @@ pub fn dynamic_light_picture() -> Image {
 pub fn fog_picture() -> Image {
     const WIDTH: u32 = 256;
     const HEIGHT: u32 = 32;
-    picture((WIDTH, HEIGHT), |x, y| {
+    Image::generate(WIDTH, HEIGHT, |x, y| {
         let below = (y as f32 + 0.5) / HEIGHT as f32;
         let mut distance = x as f32 / WIDTH as f32;
         if below < 1.0 / 32.0 {
@@ -276,16 +265,6 @@ pub fn fog_picture() -> Image {
         let step = ((distance * 8.0).min(1.0) * 255.0).floor();
         [255, 255, 255, ((step / 255.0).sqrt() * 255.0) as u8]
     })
-}
-
-fn picture((width, height): (u32, u32), texel: impl Fn(u32, u32) -> [u8; 4]) -> Image {
-    let mut rgba = Vec::with_capacity((width * height * 4) as usize);
-    for y in 0..height {
-        for x in 0..width {
-            rgba.extend(texel(x, y));
-        }
-    }
-    Image::from_rgba(width, height, rgba).unwrap_or_else(|| Image::uniform([255; 4]))
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec4};
 use relight::GameFiles;
-use relight::image::{self, Image};
+use relight::image::{self, Image, default_image};
 
 use super::alpha::AlphaGrid;
 use super::prepare::{self, TextureSettings};
@@ -137,8 +137,7 @@ impl Textures {
         };
         textures.white = textures.built_in("*white", &Image::uniform([255; 4]))?;
         textures.black = textures.built_in("*black", &Image::uniform([0, 0, 0, 255]))?;
-        let grid = prepare::default_picture();
-        textures.default_image = textures.built_in("*default", &grid)?;
+        textures.default_image = textures.built_in("*default", &default_image(32))?;
         let blob = prepare::dynamic_light_picture();
         textures.dynamic_light = textures.built_in("*dlight", &blob)?;
         textures.built_in(super::compile::FOG_IMAGE, &prepare::fog_picture())?;
