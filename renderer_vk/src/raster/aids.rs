@@ -1,4 +1,4 @@
-//! Debugging aids of the classic look: what they add to a view, and the sheet of all images.
+//! Debugging aids of the classic look, and the sheet of all images.
 
 use glam::Vec2;
 use shaders::types::constants as c;
@@ -11,40 +11,40 @@ use super::pipelines::{CullFaces, Depth, State};
 use super::shading::Shading;
 use crate::scene::DebugPolygons;
 
-/// Length of a shown normal, units.
+/// Length of a displayed normal, units.
 const NORMAL_LENGTH: f32 = 2.0;
-/// A shown normal is the outline of a sliver; this wide, units.
+/// Width of a displayed normal, which is the outline of a thin triangle, units.
 const SLIVER: f32 = 0.001;
 
 /// Debugging aids.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Aids {
-    /// Draw the edges of all triangles over everything (`r_showtris`).
+    /// Draws the edges of all triangles over everything (`r_showtris`).
     pub edges: bool,
-    /// Draw the normals of all vertices over everything (`r_shownormals`).
+    /// Draws the normals of all vertices over everything (`r_shownormals`).
     pub normals: bool,
-    /// Draw lightmaps alone where there are any (`r_lightmap`).
+    /// Draws only the lightmaps of lightmapped surfaces (`r_lightmap`).
     pub lightmaps: bool,
-    /// Draw skies over everything (`r_showsky`).
+    /// Draws skies over everything (`r_showsky`).
     pub sky_in_front: bool,
-    /// Leave out materials of a greater sort value (`r_debugSort`); 0: none.
+    /// Omits materials of a greater sort value (`r_debugSort`); 0: none.
     pub last_sort: i32,
-    /// Fragments are counted (`r_measureOverdraw`), those of each pass.
+    /// Counts the fragments of each pass (`r_measureOverdraw`).
     pub overdraw: bool,
 }
 
 impl Aids {
-    /// Whether each pass has to be a draw of its own.
+    /// Whether each pass has a draw of its own.
     pub fn passes_alone(&self) -> bool {
         self.lightmaps || self.overdraw
     }
 
-    /// Whether a material of this sort value is left out.
+    /// Whether materials of this sort value are omitted.
     pub fn leaves_out(&self, sort: f32) -> bool {
         self.last_sort != 0 && (self.last_sort as f32) < sort
     }
 
-    /// The part of the depth range that skies take.
+    /// The depth range of skies.
     pub fn sky_range(&self) -> DepthRange {
         if self.sky_in_front {
             DepthRange::Front
@@ -55,13 +55,13 @@ impl Aids {
 }
 
 impl DrawList {
-    /// Draws the edges of triangles in white, in front of everything before and after. `cull`: faces left out.
+    /// Adds the edges of triangles in white, over everything. `cull`: culled faces.
     pub(super) fn push_edges(&mut self, span: (u32, u32), draw: Draw, cull: CullFaces) {
         self.push(outlines(cull), DepthRange::Front, span, draw);
     }
 
-    /// Draws the normals of the vertices that the indices of a span use. `statics` are the world's
-    /// vertices; the view's own are in the list.
+    /// Adds the normals of the vertices of a span of indices. `statics`: the world's vertices; those of the view are in
+    /// the list.
     pub(super) fn push_normals(&mut self, span: (u32, u32), statics: &[Vertex], draw: Draw) {
         let mut used = part(&self.indices, slice::span(span.0, span.1)).to_vec();
         used.sort_unstable();
@@ -96,8 +96,8 @@ impl DrawList {
 }
 
 impl DrawList {
-    /// Draws what the collision code wants to see, added to the picture, each polygon with a white outline in front of
-    /// everything. The vertices are in the space of instance 0.
+    /// Adds the debug polygons of the collision code: additively blended, each with a white outline over everything.
+    /// Their vertices are in the space of instance 0.
     pub(super) fn push_debug_polygons(&mut self, polygons: &DebugPolygons) {
         let add = Some((c::BLEND_ONE, c::BLEND_ONE));
         let filled = State {
@@ -128,7 +128,7 @@ impl DrawList {
             let span = (start, self.indices.len() as u32 - start);
             self.push(filled, DepthRange::Normal, span, draw);
             let start = self.indices.len() as u32;
-            // an edge is the outline of a sliver
+            // an edge is the outline of a thin triangle
             let next = corners.iter().cycle().skip(1);
             for (&a, &b) in corners.iter().zip(next) {
                 let aside = (b.position - a.position).any_orthogonal_vector();
@@ -159,8 +159,8 @@ fn outlines(cull: CullFaces) -> State {
     }
 }
 
-/// The sheet of `r_showImages`: every image on a grid of 20 x 15 over the window, in 2 at its size in proportion to 512
-/// texels. `images` are texture, width and height.
+/// The sheet of `r_showImages`: every image in a grid of 20 × 15 cells over the window; with value 2 scaled by its size
+/// over 512 texels. `images`: texture, width, height.
 pub fn image_sheet(
     overlay: &mut Overlay,
     window: (u32, u32),

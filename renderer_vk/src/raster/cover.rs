@@ -1,5 +1,5 @@
-//! One colour, in some of its channels, or one depth over a rectangle. What is drawn is cleared so in the middle of a
-//! frame: where a clear stands between draws, software drivers finish all drawing before it.
+//! Fills a rectangle with a colour, in some channels, or with a depth. Replaces clears in the middle of a frame: at a
+//! clear between draws, software drivers finish all earlier drawing.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -11,28 +11,28 @@ use crate::gpu::{
     self, BlendFactor, ColorMask, DepthTest, Device, GraphicsDesc, GraphicsPipeline, Pass, Stencil,
 };
 
-/// What `cover.vert` and `cover.frag` are given.
+/// Push constants of `cover.vert` and `cover.frag`.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub struct CoverParameters {
-    /// Colour, where any is drawn.
+    /// Colour, if it is drawn.
     pub color: [f32; 4],
     /// Depth of the triangle that covers the viewport.
     pub depth: f32,
 }
 
-/// What covers.
+/// Kind of fill.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// A colour.
     Color,
-    /// A depth, in place of what is there.
+    /// A depth, which replaces the existing one.
     Depth,
-    /// A colour that is multiplied where the stencil is not 0 and the depth is not nearer.
+    /// A colour, multiplied where the stencil is not 0 and the depth is not nearer.
     Shade,
 }
 
-/// A pipeline that covers the viewport.
+/// A pipeline for a triangle that covers the viewport.
 pub fn pipeline(
     device: &Device,
     target: TargetKind,
@@ -75,7 +75,7 @@ pub struct Cover {
 }
 
 impl Cover {
-    /// Makes what drawing needs.
+    /// Creates the pipelines.
     ///
     /// # Errors
     /// The device is out of memory or cannot make a pipeline.
@@ -91,13 +91,13 @@ impl Cover {
         Ok(())
     }
 
-    /// Fills the scissor's rectangle with a colour. The viewport must be the whole image.
+    /// Fills the scissor rectangle with a colour. The viewport must be the whole image.
     pub fn color(&self, pass: &mut Pass<'_>, target: TargetKind, color: [f32; 4]) {
         let parameters = CoverParameters { color, depth: 0.0 };
         self.draw(pass, (target, Kind::Color), &parameters);
     }
 
-    /// Fills the scissor's rectangle with a depth. The viewport must be the whole image.
+    /// Fills the scissor rectangle with a depth. The viewport must be the whole image.
     pub fn depth(&self, pass: &mut Pass<'_>, target: TargetKind, depth: f32) {
         let color = [0.0; 4];
         self.draw(

@@ -1,10 +1,9 @@
-//! Depth before colour: what of the world hides all that lies behind it is drawn into the depth image first, so that of
-//! surfaces behind each other only the one in sight is textured.
+//! Depth prepass: draws the depth of occluders of the world before colour, so that only visible fragments are textured.
 //!
-//! The picture stays the same to the bit: positions are `invariant`, so such a surface still passes `LessEqual` wherever
-//! it is in sight at the end, and what it would have overwritten is not drawn at all. It costs a vertex pass without
-//! fragments: where vertices are processed in software, curves, which hide little for their many triangles, are left out.
-//! So are views with a clip plane, where fragments decide what is there.
+//! The picture is bit-identical: positions are `invariant`, so an occluder still passes `LessEqual` where it is
+//! visible, and what it would have overwritten is not drawn. The cost is a vertex pass without fragments. Curves have
+//! many triangles and hide little, so they are omitted where vertices are processed in software. Views with a clip
+//! plane have no prepass, because fragments decide visibility there.
 
 use shaders::types::Draw;
 use shaders::types::constants as c;
@@ -17,7 +16,7 @@ use super::shading::Shading;
 use crate::assets::Material;
 use crate::scene::{DrawSurface, Geometry};
 
-/// Whether the first pass of a material draws, and writes the depth of, everything that its surfaces cover.
+/// Whether the first pass of a material writes colour and depth on all of its surfaces.
 pub(super) fn covers(material: &Material) -> bool {
     let all_of_it = material.passes.first().is_some_and(|pass| {
         pass.blend.is_none()
@@ -29,8 +28,8 @@ pub(super) fn covers(material: &Material) -> bool {
     all_of_it && material.sort <= sort::OPAQUE && !material.polygon_offset
 }
 
-/// Whether it cannot be seen when a material's surfaces are drawn before or after others of which that is true: of all of
-/// them the nearest one is left in each pixel, with nothing of those behind it.
+/// Whether the drawing order of a material's surfaces among others of such materials is invisible: each pixel shows
+/// only the nearest of them.
 pub(super) fn order_free(material: &Material) -> bool {
     let Some((first, rest)) = material.passes.split_first() else {
         return material.sort <= sort::OPAQUE;
@@ -41,12 +40,12 @@ pub(super) fn order_free(material: &Material) -> bool {
         && !first.depth_equal
         && material.sort <= sort::OPAQUE
         && !material.polygon_offset;
-    // in the holes of the first pass the others would show, over what is drawn so far
+    // later passes also draw in the first one's holes, over what is drawn so far
     let holes = first.alpha_func != c::ALPHAFUNC_NONE;
     hides && (rest.iter()).all(|pass| pass.depth_test && (pass.depth_equal || !holes))
 }
 
-/// How depth alone is drawn.
+/// State of a draw of depth only.
 pub(super) fn depth_alone(cull: CullFaces) -> State {
     State {
         blend: None,
@@ -62,19 +61,19 @@ pub(super) fn depth_alone(cull: CullFaces) -> State {
     }
 }
 
-/// A surface whose depth is drawn first.
+/// A surface of the prepass.
 #[derive(Clone, Copy)]
 pub(super) struct Occluder {
     cull: CullFaces,
     instance: u32,
     distance_squared: f32,
-    /// Of the map's indices.
+    /// First index in the map's indices.
     first_index: u32,
     index_count: u32,
 }
 
 impl DrawList {
-    /// Takes note of the surfaces of a group that hide much. `plain` is how the group is drawn.
+    /// Collects the occluders of a group. `plain`: state of the group's draws.
     pub(super) fn note_depth(
         &mut self,
         material: &Material,
@@ -101,11 +100,11 @@ impl DrawList {
         }
     }
 
-    /// Puts the depth of what was noted before all other calls: one call for all surfaces of a model that are culled
-    /// alike, whatever their materials. The nearest come first, because GPUs reject whole blocks behind them at once.
+    /// Inserts the depth prepass before all other calls: one call for all surfaces of a model with the same culling,
+    /// whatever their materials. The nearest come first, so that GPUs reject whole blocks behind them.
     pub(super) fn put_depth_first(&mut self, indices: &[u32]) {
         let alike = |o: &Occluder| (o.cull, o.instance);
-        // squares are not negative, so their bits have their order
+        // the bits of non-negative floats sort like the floats
         self.occluders
             .sort_unstable_by_key(|o| (alike(o), o.distance_squared.to_bits(), o.first_index));
         for run in self.occluders.chunk_by(|a, b| alike(a) == alike(b)) {

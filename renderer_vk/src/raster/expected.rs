@@ -1,7 +1,7 @@
-//! What registered materials will be drawn with: pipelines are made and drawn with once while the game loads, and not
-//! when a surface first comes into sight. A pipeline alone is not all that a driver makes: Mesa's in software compiles
-//! shaders for blending, formats and samplers when these first meet in a draw. What is not foreseen here (mirrors,
-//! fog over blended stages, debugging aids) is made when used.
+//! Draw states of the registered materials. Their pipelines are created and used once while the game loads, not when a
+//! surface first becomes visible: Mesa's software driver compiles shaders for blending, formats and samplers only in
+//! the first draw that combines them. States that are not predicted here (mirrors, fog over blended stages, debugging
+//! aids) are created at first use.
 
 use glam::{Vec2, Vec3};
 use shaders::types::constants as c;
@@ -18,18 +18,18 @@ use crate::assets::compile::sampler;
 use crate::assets::{LightmapClass, Material, RasterPass};
 use shaderscript::sort;
 
-/// What is known of a map before it is seen.
+/// Facts about a map before its first view.
 #[derive(Clone, Copy, Debug)]
 pub struct ExpectedWorld {
-    /// Texture of one of its lightmap pages, or `NO_TEXTURE`. Which one it is makes no difference.
+    /// Texture of any of its lightmap pages, or `NO_TEXTURE`.
     pub lightmap: u32,
-    /// It has fog volumes.
+    /// The map has fog volumes.
     pub fog: bool,
 }
 
 impl DrawList {
-    /// Adds a call for each state that registered materials are drawn with in views and in the overlay: two triangles,
-    /// one for each way round, that cover the viewport at the far end of the depth range.
+    /// Adds a call for each state of the registered materials in views and in the overlay: two triangles of opposite
+    /// winding that cover the viewport at the far end of the depth range.
     pub fn add_expected(&mut self, stages: StageContext<'_>, world: ExpectedWorld) {
         let first_vertex = self.vertices.len() as u32;
         for (x, y) in [(-1.0, -1.0), (3.0, -1.0), (-1.0, 3.0)] {
@@ -69,7 +69,7 @@ impl DrawList {
     }
 }
 
-/// Calls `found` with how the surfaces of a material are drawn, and its pictures if it is for the overlay.
+/// Calls `found` with each draw of a material's surfaces, and of its pictures if the overlay uses it.
 fn surfaces(
     stages: &StageContext<'_>,
     material: &Material,
@@ -96,7 +96,7 @@ fn surfaces(
         Some((state, draw))
     };
     for passes in passes::draws(&material.passes, false) {
-        // pictures of the overlay are sprites and marks in views, too, unless no script says how
+        // views use pictures of the overlay as sprites and marks, if no script defines the material
         if flat && passes.iter().any(|pass| !pass.depth_test) {
             continue;
         }
@@ -127,7 +127,7 @@ fn surfaces(
     }
 }
 
-/// Calls `found` with how a sky is drawn.
+/// Calls `found` with each draw of a sky.
 fn sky(stages: &StageContext<'_>, material: &Material, mut found: impl FnMut(State, Draw)) {
     let faces = material.sky.as_ref().and_then(|sky| sky.faces.as_ref());
     if let Some(&image) = faces.and_then(|images| images.first()) {
@@ -143,7 +143,7 @@ fn sky(stages: &StageContext<'_>, material: &Material, mut found: impl FnMut(Sta
     }
 }
 
-/// Calls `found` with how dynamic lights fall on walls.
+/// Calls `found` with each draw of dynamic lights on walls.
 fn lights(stages: &StageContext<'_>, mut found: impl FnMut(State, Draw)) {
     let (shading, draw) = stages.light(Draw::default());
     for source in [c::BLEND_DST_COLOR, c::BLEND_ONE] {
@@ -170,7 +170,7 @@ fn shaded(
     stages.passes(material, passes, &instance, lightmap, fog, Draw::default())
 }
 
-/// What all expected calls are drawn as.
+/// The instance of all expected calls.
 pub fn expected_instance() -> Instance {
     overlay_instance(0.0)
 }

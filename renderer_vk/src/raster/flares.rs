@@ -1,5 +1,5 @@
-//! Flares (`r_flares`): tested against the depth of the view that was just drawn, or in the traced look by rays, faded in
-//! and out, and drawn over it, all on the GPU, so that nothing waits for the answer.
+//! Flares (`r_flares`): tested against the depth of the view that was just drawn, in the traced look by rays; then
+//! faded and drawn over the view. All of this runs on the GPU without a read-back.
 //!
 //! Source: engine behaviour of `renderer_opengl1` (flares).
 
@@ -17,7 +17,7 @@ use crate::gpu::{
 };
 use crate::scene::{ClassicScene, DrawSurface, Geometry, ViewScene};
 
-/// Invocations of a workgroup in `flare_fade.comp`.
+/// Invocations of a workgroup of `flare_fade.comp`.
 const GROUP: u32 = 64;
 
 #[repr(C)]
@@ -40,17 +40,17 @@ struct FadeParameters {
     padding: u32,
 }
 
-/// Which flare of which view: surface, entity, number of the view in the frame, seen through a portal or not.
+/// Identifies a flare in a view: surface, entity, number of the view in the frame, whether it is a portal's view.
 type Key = (u32, u32, u32, bool);
 
-/// Where a flare's state is.
+/// Slot of a flare's state.
 struct Slot {
     index: u32,
-    /// The frame that it was last in sight in.
+    /// Last frame that had the flare.
     frame: u64,
 }
 
-/// Evaluates flares, and keeps what is known of them from frame to frame.
+/// Evaluates flares, and keeps their states between frames.
 pub struct Flares {
     device: Device,
     test: HashMap<TargetKind, GraphicsPipeline>,
@@ -59,18 +59,18 @@ pub struct Flares {
     vertices: Option<Buffer>,
     slots: HashMap<Key, Slot>,
     free: Vec<u32>,
-    /// Slots ever given out.
+    /// Number of slots ever assigned.
     used: u32,
     frame: u64,
-    /// Views of this frame so far.
+    /// Number of views in this frame.
     views: u32,
     flares: Vec<Flare>,
     quads: Option<ClassicScene>,
-    /// The lack of what the depth test needs was told.
+    /// The missing feature for the depth test was logged.
     warned: bool,
 }
 
-/// The flares of a view, to be tested: whoever sees one sets the `seen` of its state.
+/// The flares of a view for the visibility test, which sets `seen` in the state of each visible flare.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FlareTest {
     /// Device address of the [`Flare`]s.
@@ -82,7 +82,7 @@ pub struct FlareTest {
 }
 
 impl Flares {
-    /// Nothing is known yet.
+    /// No flares.
     pub fn new(device: &Device) -> Self {
         Self {
             device: device.clone(),
@@ -101,7 +101,7 @@ impl Flares {
         }
     }
 
-    /// A frame of the game is over: what was not in sight in it is forgotten.
+    /// Ends a frame of the game: drops flares that it did not have.
     pub fn end_frame(&mut self) {
         let frame = self.frame;
         let free = &mut self.free;
@@ -116,7 +116,7 @@ impl Flares {
         self.views = 0;
     }
 
-    /// Makes the flares of the frame's next view ready to be tested; without `count` there are none.
+    /// Prepares the flares of the frame's next view for the test; without `count` there are none.
     ///
     /// # Errors
     /// The device is out of memory.
@@ -139,7 +139,7 @@ impl Flares {
         })
     }
 
-    /// Tests flares against the depth of a view that was just drawn to `target`; `false`: the device cannot.
+    /// Tests flares against the depth of the view just drawn to `target`. `false`: the device lacks a feature.
     ///
     /// # Errors
     /// The device is out of memory or cannot make a pipeline.
@@ -178,8 +178,8 @@ impl Flares {
         Ok(true)
     }
 
-    /// Fades flares that were tested, and makes their squares: returns the address of their vertices, four for each
-    /// flare, and what to draw of them.
+    /// Fades the tested flares and expands them to quads: returns the address of their vertices, four for each flare,
+    /// and the view that draws them.
     ///
     /// # Errors
     /// The device is out of memory or cannot make a pipeline.
@@ -222,7 +222,7 @@ impl Flares {
         Ok((vertices.address(), quads))
     }
 
-    /// Adds to `flares` those of the view, each with its slot.
+    /// Appends the flares of the view with their slots to `flares`.
     fn place(&mut self, scene: &ViewScene, view: u32) {
         for found in &scene.flares {
             let key = (found.surface, found.instance, view, scene.view.is_portal);
@@ -246,7 +246,7 @@ impl Flares {
         }
     }
 
-    /// The states, in a buffer that holds every slot in use.
+    /// The buffer of states, large enough for all slots.
     fn fit_states(&mut self, recorder: &mut Recorder) -> Result<Buffer, gpu::Error> {
         let wanted = u64::from(self.used) * size_of::<FlareState>() as u64;
         if let Some(states) = self.states.as_ref().filter(|s| s.size() >= wanted) {
@@ -265,7 +265,7 @@ impl Flares {
         Ok(grown)
     }
 
-    /// A buffer for the squares of all flares of a view.
+    /// A buffer for the quads of a view's flares.
     fn fit_vertices(&mut self) -> Result<Buffer, gpu::Error> {
         let wanted = (self.flares.len() * 4 * size_of::<Vertex>()) as u64;
         if let Some(vertices) = self.vertices.as_ref().filter(|v| v.size() >= wanted) {
@@ -310,7 +310,7 @@ fn test_pipeline(device: &Device, target: TargetKind) -> Result<GraphicsPipeline
     )
 }
 
-/// Makes `quads` the view that shows the squares of `count` flares of `scene`.
+/// Fills `quads` with a view that draws the quads of `count` flares of `scene`.
 fn list_quads(quads: &mut ClassicScene, scene: &ViewScene, material: u32, count: u32) {
     quads.view = scene.view;
     quads.view.clip_plane = None;
@@ -339,7 +339,7 @@ fn list_quads(quads: &mut ClassicScene, scene: &ViewScene, material: u32, count:
     });
 }
 
-/// Window pixels to clip space, in the middle of the depth range, as the engine draws flares.
+/// Window pixels to clip space, in the middle of the depth range, where the engine draws flares.
 pub fn window_to_clip([x, y, width, height]: [i32; 4]) -> Mat4 {
     let (width, height) = (width.max(1) as f32, height.max(1) as f32);
     Mat4::from_cols(

@@ -1,13 +1,12 @@
-//! The surfaces of a view, grouped by what one draw needs alike, and the calls of each group: its stages, then its
-//! dynamic lights, then its fog, as in the engine.
+//! Groups the surfaces of a view that share a draw, and adds the calls of each group: its stages, then its dynamic
+//! lights, then its fog, as in the engine.
 //!
-//! Changing the pipeline is what a call costs most, with software drivers above all. So where the picture cannot tell,
-//! calls of the same state are brought together. Surfaces whose first stage covers all behind them
-//! ([`depth_first::covers`]) end up one in each pixel, whatever the order: of neighbouring groups of one such material
-//! every draw's stages ([`passes`]) are drawn for all of them before the next ones, and the lights and the fog of all
-//! such groups are put off until something else is drawn. They pass the depth test only on the surface that is in sight.
-//! For the same reason entities are drawn before the map where they are between such surfaces: what they hide is not
-//! textured.
+//! Pipeline changes are the main cost of a call, above all with software drivers. So calls of equal state are joined
+//! where the order is invisible. Surfaces whose first stage covers everything behind them ([`depth_first::covers`])
+//! leave one surface in each pixel, in any order. For neighbouring groups of one such material, the draws of a stage
+//! ([`passes`]) are added for all groups before the next stage, and the lights and fog of all such groups are deferred
+//! until something else is drawn. They pass the depth test only on the visible surface. For the same reason entities
+//! are drawn before the map between such surfaces: what they hide is not textured.
 
 use shaders::types::constants as c;
 use shaders::types::{Draw, Instance};
@@ -27,12 +26,12 @@ use crate::assets::{Material, RasterPass};
 use crate::scene::{ClassicScene, DrawSurface, Geometry};
 use shaderscript::sort;
 
-/// `surfaceparm nodlight` and `surfaceparm sky`: no dynamic light falls on these.
+/// `surfaceparm nodlight` and `surfaceparm sky`: surfaces without dynamic lights.
 const NO_DYNAMIC_LIGHT: u32 = 0x20000 | 0x4;
-/// As many dynamic lights as the engine draws on surfaces: one bit each.
+/// Most dynamic lights of a surface, as in the engine: one bit each.
 const MAX_LIGHTS: usize = 32;
 
-/// What a group of surfaces has in common.
+/// State shared by the surfaces of a group.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Common {
     material: u32,
@@ -53,7 +52,7 @@ impl Common {
         }
     }
 
-    /// How many of the first of some surfaces have everything in common.
+    /// Number of first surfaces with equal state.
     fn run(surfaces: &[DrawSurface]) -> usize {
         let common = surfaces.first().map(Self::of);
         surfaces
@@ -62,24 +61,24 @@ impl Common {
             .count()
     }
 
-    /// It belongs to an entity and is no part of the map.
+    /// Whether it belongs to an entity, not to the map.
     fn moves(&self) -> bool {
         self.dynamic && self.instance != 0
     }
 }
 
-/// Neighbouring surfaces that have everything in common.
+/// Neighbouring surfaces of equal state.
 #[derive(Clone, Copy)]
 pub(super) struct Group {
     common: Common,
-    /// Where they begin among the view's, and how many there are.
+    /// First surface in the view's list, and their number.
     surfaces: (usize, usize),
     /// First index and number of indices.
     span: (u32, u32),
     range: DepthRange,
 }
 
-/// What all groups are drawn with.
+/// Parameters of all groups.
 #[derive(Clone, Copy)]
 pub(super) struct GroupContext<'a> {
     pub surfaces: &'a [DrawSurface],
@@ -107,14 +106,14 @@ impl GroupContext<'_> {
     }
 }
 
-/// Whether fog is drawn over surfaces of a material that store `fog`, and if so, whether they are opaque.
+/// Whether fog is drawn over surfaces of a material with `fog`, and if so, whether they are opaque.
 pub(super) fn fogged(material: &Material, fog: u32) -> Option<bool> {
     let opaque = material.sort <= sort::OPAQUE;
     let passes = opaque || material.flags & c::MATERIAL_FOG != 0;
     (fog != 0 && passes).then_some(opaque)
 }
 
-/// How fog is drawn over what `plain` draws.
+/// State of fog over the draws of `plain`.
 pub(super) fn fog_state(plain: State, opaque: bool, shading: Shading) -> State {
     State {
         blend: Some((c::BLEND_SRC_ALPHA, c::BLEND_ONE_MINUS_SRC_ALPHA)),
@@ -149,7 +148,7 @@ impl DrawList {
             let run = rest.iter().take_while(order_free).count();
             let others = rest.iter().skip(run).take_while(|s| !order_free(s)).count();
             let (these, those) = rest.split_at(run);
-            // what moves hides the map more often than the other way round, and is not in the depth drawn first
+            // moving geometry hides the map more often than the reverse, and is not in the depth prepass
             self.add_groups(these, context, |common| common.moves());
             self.add_groups(these, context, |common| !common.moves());
             self.draw_put_off();
@@ -159,7 +158,7 @@ impl DrawList {
         }
     }
 
-    /// Adds the calls of those groups of some of the view's surfaces that are wanted.
+    /// Adds the calls of the groups that `wanted` selects.
     fn add_groups(
         &mut self,
         surfaces: &[DrawSurface],
@@ -218,7 +217,7 @@ impl DrawList {
         self.groups = groups;
     }
 
-    /// The group that begins with a surface, with its indices copied.
+    /// The group that begins with a surface. Copies its indices.
     fn gather_group(&mut self, first: usize, context: &GroupContext<'_>) -> Group {
         let surfaces = part(context.surfaces, first..);
         let common = surfaces.first().map(Common::of);
@@ -288,7 +287,7 @@ impl DrawList {
         let lightmap = group.common.lightmap;
         let (mut shading, mut draw) =
             stages.passes(material, passes, instance, lightmap, fog_adjust, draw);
-        // of two textures in one pass the second is shown, which with a lightmap is the lightmap
+        // of two textures in one pass the second is shown: the lightmap, if the pass has one
         if aids.lightmaps && pass.stage_count == 2 {
             (shading, draw) = match (shows_lightmap(pass, stages.materials), lightmap) {
                 (false, _) => (shading.second_alone(), draw),
@@ -361,13 +360,13 @@ impl DrawList {
         self.fog.push(call);
     }
 
-    /// Draws the lights and the fog that were put off.
+    /// Adds the deferred lights and fog.
     fn draw_put_off(&mut self) {
         self.calls.append(&mut self.lights);
         self.calls.append(&mut self.fog);
     }
 
-    /// A call, whose record is added.
+    /// Adds a call with its parameters.
     pub(super) fn call(
         &mut self,
         state: State,
@@ -386,7 +385,7 @@ impl DrawList {
         }
     }
 
-    /// Adds a call; one that differs from the last one only in where its indices lie makes that one longer.
+    /// Adds a call, or extends the last one if both differ only in their indices.
     pub(super) fn push(&mut self, state: State, range: DepthRange, span: (u32, u32), draw: Draw) {
         if let Some(last) = self.calls.last_mut()
             && (last.state, last.range) == (state, range)

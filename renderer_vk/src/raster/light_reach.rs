@@ -1,22 +1,22 @@
-//! Which triangles a dynamic light falls on. Drawing the others would add nothing, at the price of a texture sample for
-//! each of their pixels.
+//! Selects the triangles that a dynamic light reaches. The others would be drawn without effect, at the cost of a
+//! texture sample per pixel.
 
 use glam::{Mat3, Vec3};
 use shaders::types::{Instance, Vertex};
 
 use crate::api::DynamicLight;
 
-/// A dynamic light as an instance's own space sees it.
+/// A dynamic light in the space of an instance.
 pub struct LightReach {
-    /// Where the light is, along the instance's axes.
+    /// Position of the light along the instance's axes.
     origin: Vec3,
-    /// Point of the instance to its place along the instance's axes.
+    /// Transforms a point of the instance to coordinates along its axes.
     along_axes: Mat3,
     radius: f32,
 }
 
 impl LightReach {
-    /// Of a light on an instance.
+    /// The light relative to an instance.
     pub fn new(light: &DynamicLight, instance: &Instance) -> Self {
         let axes = Mat3::from_cols_array_2d(&instance.axis.map(|axis| axis.to_array()));
         let onto = axes.transpose();
@@ -27,8 +27,8 @@ impl LightReach {
         }
     }
 
-    /// Appends those of the triangles of `indices` that the light may fall on. The spot is a square column along the
-    /// instance's z axis, as wide as the light's radius and twice as high (`draw.vert`).
+    /// Appends the triangles of `indices` that the light may reach. The spot is a square column along the instance's z
+    /// axis, as wide as the light's radius and twice as high (`draw.vert`).
     pub fn gather(&self, vertices: &[Vertex], indices: &[u32], found: &mut Vec<u32>) {
         for corners in indices.chunks_exact(3) {
             let beyond = corners.iter().fold(u32::MAX, |all, &index| {
@@ -42,7 +42,7 @@ impl LightReach {
         }
     }
 
-    /// One bit for each side of the column that a point lies beyond.
+    /// One bit for each side of the column beyond which a point lies.
     fn beyond(&self, point: Vec3) -> u32 {
         let delta = self.origin - self.along_axes * point;
         let half = self.radius * 0.5;
@@ -74,7 +74,7 @@ mod tests {
             color: Vec3::ONE,
             additive: false,
         };
-        // turned by a quarter and twice as large: the light is at (5, -50, 0) of its own space
+        // rotated by a quarter turn and scaled by 2: the light is at (5, -50, 0) in instance space
         let instance = Instance {
             axis: [Vec3::Y * 2.0, Vec3::NEG_X * 2.0, Vec3::Z * 2.0],
             ..Instance::default()
@@ -89,7 +89,7 @@ mod tests {
             vertex(8.0, -50.0, 0.0),
             vertex(9.0, -50.0, 0.0),
             vertex(8.0, -49.0, 0.0),
-            // across a corner of the column: beyond two sides, but not wholly beyond one
+            // beyond two sides, but not completely beyond one
             vertex(20.0, -50.0, 0.0),
             vertex(5.0, -30.0, 0.0),
             vertex(20.0, -30.0, 0.0),
@@ -101,7 +101,7 @@ mod tests {
         let indices: Vec<u32> = (0..12).chain([99, 3, 4]).collect();
         let mut found = Vec::new();
         reach.gather(&vertices, &indices, &mut found);
-        // an index that leads nowhere is drawn as without this
+        // triangles with an index out of range are kept
         assert_eq!(found, [0, 1, 2, 6, 7, 8, 99, 3, 4]);
     }
 }

@@ -1,4 +1,4 @@
-//! The draw calls of a view: its surfaces ([`super::groups`]), and between the solid ones and the rest its skies.
+//! The draw calls of a view: its surfaces ([`super::groups`]), and its skies between the opaque and the other ones.
 
 use shaders::types::constants as c;
 use shaders::types::{Draw, Instance, Vertex};
@@ -16,18 +16,19 @@ use crate::assets::{Material, Materials, RasterPass};
 use crate::scene::{ClassicScene, SKY_FACES, Sun, VisibleSky};
 use shaderscript::{Cull, sort};
 
-/// The part of the depth range that a draw uses.
+/// The depth range of a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DepthRange {
-    /// All of it.
+    /// The whole range.
     Normal,
-    /// The nearest third: a first-person weapon does not stick in walls. In stereo its pictures meet at the near plane.
+    /// The nearest third, so that a first-person weapon does not intersect walls. In stereo its pictures coincide at
+    /// the near plane.
     Near,
     /// The nearest third, with the view's own projection in stereo.
     Crosshair,
-    /// The far end: the sky lies behind everything.
+    /// The far end, for skies.
     Sky,
-    /// The near end: debugging lines show through everything.
+    /// The near end, for debugging lines over everything.
     Front,
 }
 
@@ -42,11 +43,11 @@ pub struct Call {
     pub first_index: u32,
     /// Number of indices.
     pub index_count: u32,
-    /// Index of its record in [`DrawList::draws`].
+    /// Index of its parameters in [`DrawList::draws`].
     pub draw: u32,
 }
 
-/// The world's arrays as the GPU has them.
+/// The world's vertex and index arrays.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Statics<'a> {
     /// Vertices.
@@ -55,48 +56,48 @@ pub struct Statics<'a> {
     pub indices: &'a [u32],
 }
 
-/// Triangles of a sky or of the sun, with what all their stages are drawn with.
+/// Triangles of a sky or of the sun, with the parameters of all their stages.
 #[derive(Clone, Copy)]
 struct SkyPart<'a> {
-    /// Of the sky, or of the sun.
+    /// Material of the sky or of the sun.
     material: &'a Material,
-    /// The world's instance: its time is that of the stages.
+    /// The world's instance, whose time the stages use.
     world: &'a Instance,
-    /// Which faces are left out.
+    /// Culled faces.
     cull: CullFaces,
     /// First index in [`DrawList::indices`], and number of indices.
     span: (u32, u32),
-    /// Of the draw, what does not depend on the stage.
+    /// Parameters that do not depend on the stage.
     draw: Draw,
 }
 
-/// The draw calls of a view and the arrays that they read. Kept between frames so that nothing is allocated anew.
+/// The draw calls of a view and their arrays. Kept between frames to reuse the allocations.
 #[derive(Default)]
 pub struct DrawList {
-    /// In drawing order.
+    /// Calls in drawing order.
     pub calls: Vec<Call>,
-    /// One for each call.
+    /// Parameters of each call.
     pub draws: Vec<Draw>,
-    /// Indices of all calls, into the static or the dynamic vertices.
+    /// Indices of all calls into the static or the dynamic vertices.
     pub indices: Vec<u32>,
-    /// Vertices that move: the view's, then the sky's.
+    /// Moving vertices: those of the view, then those of the sky.
     pub vertices: Vec<Vertex>,
     /// See [`super::depth_first`].
     pub(super) depth_first: Vec<Call>,
-    /// Whether curves are among what is drawn by depth first; see [`super::depth_first`].
+    /// Draws depth of curves first, too; see [`super::depth_first`].
     pub(super) curves_hide: bool,
     /// See [`super::depth_first`].
     pub(super) occluders: Vec<Occluder>,
-    /// Of the material at hand; see [`super::groups`].
+    /// Groups of the current material; see [`super::groups`].
     pub(super) groups: Vec<Group>,
-    /// Lights that were put off.
+    /// Deferred calls of dynamic lights.
     pub(super) lights: Vec<Call>,
-    /// Fog that was put off, to be drawn after the lights.
+    /// Deferred calls of fog, drawn after the lights.
     pub(super) fog: Vec<Call>,
 }
 
 impl DrawList {
-    /// An empty list. `curves_hide`: vertices are cheap, so that depth is drawn first of curves, too.
+    /// An empty list. `curves_hide`: draws depth of curves first, for devices with fast vertex processing.
     pub fn new(curves_hide: bool) -> Self {
         Self {
             curves_hide,
@@ -114,7 +115,7 @@ impl DrawList {
         self.occluders.clear();
     }
 
-    /// Adds everything that a view shows.
+    /// Adds everything in a view.
     pub fn add_view(
         &mut self,
         scene: &ClassicScene,
@@ -198,7 +199,7 @@ impl DrawList {
             return;
         }
         let first_index = self.indices.len() as u32;
-        // one dome serves all skies, and none has clouds below
+        // all skies share one dome, without clouds below the horizon
         let clouds = sky::Coordinates::Clouds(stages.materials.cloud_height());
         for face in 0..SKY_FACES - 1 {
             if let Some(cells) = visible.coverage.cells(face) {
@@ -235,7 +236,7 @@ impl DrawList {
         }
     }
 
-    /// The sun's disc, behind everything but the sky.
+    /// Adds the sun's disc, in front of the sky and behind everything else.
     fn add_sun(&mut self, sun: &Sun, scene: &ClassicScene, stages: StageContext<'_>, aids: Aids) {
         let material = stages.materials.get(sun.material);
         let Some(world) = scene.instances.first() else {
@@ -288,7 +289,7 @@ impl DrawList {
     }
 }
 
-/// What is drawn at the far end of the depth range.
+/// State of draws at the far end of the depth range.
 pub(super) fn sky_state(
     blend: Option<(u32, u32)>,
     depth_write: bool,
@@ -306,7 +307,7 @@ pub(super) fn sky_state(
     }
 }
 
-/// Whether one of the pass's stages draws the lightmap.
+/// Whether a stage of the pass shows the lightmap.
 pub(super) fn shows_lightmap(pass: &RasterPass, materials: &Materials) -> bool {
     let stages = &materials.arrays().stages;
     let shows = |&&stage: &&u32| {
@@ -320,7 +321,7 @@ pub(super) fn shows_lightmap(pass: &RasterPass, materials: &Materials) -> bool {
         .any(|stage| shows(&stage))
 }
 
-/// The depth comparison of a stage.
+/// The depth comparison of a pass.
 pub fn stage_depth(pass: &RasterPass) -> Depth {
     match (pass.depth_test, pass.depth_equal) {
         (false, _) => Depth::Always,
@@ -337,7 +338,7 @@ pub(super) fn light_source_factor(light: &DynamicLight) -> u32 {
     }
 }
 
-/// The engine's front faces wind clockwise; a mirror turns them round.
+/// The engine's front faces wind clockwise; a mirror reverses the winding.
 pub(super) fn faces(cull: Cull, mirrored: bool) -> CullFaces {
     match (cull, mirrored) {
         (Cull::None, _) => CullFaces::None,
@@ -346,9 +347,9 @@ pub(super) fn faces(cull: Cull, mirrored: bool) -> CullFaces {
     }
 }
 
-/// The channels of a blended stage that fog scales, by its blend function; none unless the material's first stage blends,
-/// too (`adjustColorsForFog`, `ComputeColors`). The material's sort makes no difference: clouds of a sky fade like this and
-/// get a fog pass besides.
+/// The channels of a blended stage that fog scales, by its blend function; none unless the material's first stage
+/// blends, too (`adjustColorsForFog`, `ComputeColors`). The material's sort does not matter: clouds of a sky are scaled
+/// like this and also get a fog pass.
 pub(super) fn fog_adjust(material: &Material, fog: u32, blend: Option<(u32, u32)>) -> u32 {
     let first_blends = material.passes.first().is_some_and(|p| p.blend.is_some());
     if fog == 0 || !first_blends {

@@ -1,8 +1,8 @@
-//! The classic look: multi-stage materials with lightmaps as the engine's own renderer draws them, and the 2D overlay
-//! that both looks share.
+//! The classic look: multi-stage materials with lightmaps, as the engine's renderer draws them. Also draws the 2D
+//! overlay of both looks.
 //!
-//! Colours stay as displayed (encoded) throughout: the target is RGBA8 without conversion, and stages blend in that
-//! space, as they do in the engine.
+//! Colours are display-encoded throughout: the target is RGBA8 without conversion, and stages blend in that encoding,
+//! as in the engine.
 
 mod aids;
 mod cover;
@@ -48,21 +48,21 @@ use pipelines::{Pipelines, State};
 use shadows::Shadows;
 use target::TargetKind;
 
-/// Format of the frame's colour image, unless it is shown just as it is: then it has the window's.
+/// Format of the frame's colour image, unless the window shows it unchanged: then it has the window's format.
 pub const COLOR_FORMAT: Format = Format::Rgba8;
 
-/// How far down 3D views are moved, pixels: one step of the usual grid of 1/256 that corners are rounded to. Windows of
-/// OpenGL count rows from the bottom, so of a pixel that an edge cuts through its middle the triangle
-/// above the edge gets it there, the one below the edge here. Level cameras meet such edges often.
+/// Downward shift of 3D views, pixels: one step of the subpixel grid of 1/256. An edge may run through pixel centres,
+/// as under level cameras. In OpenGL, whose rows count from the bottom, such pixels belong to the triangle above the
+/// edge, in Vulkan to the one below. The shift restores the former.
 const EDGE_SHIFT: f32 = 1.0 / 256.0;
 
-/// What a draw list needs besides itself.
+/// Parameters of a draw list.
 pub struct ViewParameters<'a> {
     /// World to clip space.
     pub world_to_clip: Mat4,
-    /// World to clip space of [`DepthRange::Near`], where it differs.
+    /// World to clip space of [`DepthRange::Near`], if different.
     pub near_world_to_clip: Option<Mat4>,
-    /// Only the positive side of `xyz.p = w` shows; zero: everything.
+    /// Draws only the positive side of `xyz.p = w`; zero: both sides.
     pub clip_plane: [f32; 4],
     /// Camera position, world space.
     pub origin: Vec3,
@@ -74,7 +74,7 @@ pub struct ViewParameters<'a> {
     pub materials: MaterialBuffers,
     /// Address of the world's vertices, or 0.
     pub static_vertices: u64,
-    /// Address of the vertices that move, where they are not the list's own.
+    /// Address of the moving vertices; `None`: those of the list.
     pub dynamic_vertices: Option<u64>,
     /// Address of the fog volumes, or 0.
     pub fogs: u64,
@@ -82,24 +82,24 @@ pub struct ViewParameters<'a> {
     pub instances: &'a [Instance],
     /// Dynamic lights.
     pub lights: &'a [DynamicLight],
-    /// They shine on what is turned away from them too.
+    /// Lights also reach surfaces that face away.
     pub light_backs: bool,
-    /// Pixels from the left and the top, width, height.
+    /// Left, top, width and height, pixels.
     pub viewport: [i32; 4],
-    /// Depth starts afresh (3D views; the overlay draws over what is there).
+    /// Clears depth first (3D views; not the overlay).
     pub clear_depth: bool,
-    /// Colour that the viewport is filled with first.
+    /// Colour that clears the viewport first.
     pub clear_color: Option<[f32; 4]>,
-    /// Shadow volumes with the view that they are seen in; without effect unless the depth image has a stencil.
+    /// Shadow volumes with their view; ignored if the depth image has no stencil.
     pub shadows: Option<(&'a ShadowVolumes, &'a View)>,
 }
 
-/// Device addresses of a view's `RasterView`s.
+/// Device addresses of the `RasterView`s of a view.
 #[derive(Clone, Copy)]
 struct ViewAddresses {
-    /// Of all depth ranges but [`DepthRange::Near`].
+    /// For all depth ranges but [`DepthRange::Near`].
     all: u64,
-    /// Of [`DepthRange::Near`].
+    /// For [`DepthRange::Near`].
     near: u64,
 }
 
@@ -110,12 +110,12 @@ pub struct Raster {
     shadows: Shadows,
     cover: Cover,
     overdraw: Overdraw,
-    /// The view's dynamic lights on their way to the GPU; kept so that nothing is allocated anew.
+    /// Buffer for the upload of the view's dynamic lights.
     lights: Vec<RasterLight>,
 }
 
 impl Raster {
-    /// Makes the shared objects; pipelines follow when first used.
+    /// Creates the shared objects; pipelines are created at first use.
     pub fn new(device: &Device) -> Self {
         Self {
             device: device.clone(),
@@ -127,17 +127,17 @@ impl Raster {
         }
     }
 
-    /// Whether edges of triangles can be drawn.
+    /// Whether the device can draw edges of triangles.
     pub fn draws_edges(&self) -> bool {
         self.device.info().wireframe
     }
 
-    /// The decals' depth offset.
+    /// Sets the depth offset of decals.
     pub fn set_offset(&mut self, factor: f32, units: f32) {
         self.pipelines.set_offset((factor, units));
     }
 
-    /// Begins a frame; `measure`: fragments are counted (`r_measureOverdraw`).
+    /// Begins a frame. `measure`: counts fragments (`r_measureOverdraw`).
     ///
     /// # Errors
     /// Out of memory.
@@ -149,14 +149,13 @@ impl Raster {
         self.overdraw.begin(recorder, measure)
     }
 
-    /// Fragments of the newest frame that is over and was measured.
+    /// Number of fragments of the newest finished frame that was measured.
     pub fn fragments(&self) -> u32 {
         self.overdraw.fragments()
     }
 
-    /// Drops the pipelines of states that no call of a list has; draws the calls whose states are new into a picture of one
-    /// pixel that nobody sees, so that a driver has compiled all that they need when they are first drawn in a frame. Waits
-    /// for that.
+    /// Drops pipelines that no call of the lists uses. Draws calls with new states to an image of one pixel, so that
+    /// the driver compiles all it needs before the first frame that draws them. Waits for completion.
     ///
     /// # Errors
     /// The device is out of memory or cannot make a pipeline.
@@ -192,7 +191,7 @@ impl Raster {
         device.immediate(|recorder| self.record(recorder, "warm-up", target, list, p))
     }
 
-    /// Records a draw list as one pass called `name`.
+    /// Records a draw list as a pass called `name`.
     ///
     /// # Errors
     /// The device is out of memory or cannot make a pipeline.
@@ -233,8 +232,8 @@ impl Raster {
         if width == 0 || height == 0 {
             return Ok(());
         }
-        // Depth is kept for no later view, so that of the whole image may go where drawing begins. Mesa's software driver
-        // would take that for a picture of its own, and wake its threads for it.
+        // No later view reads this depth, so a new rendering may clear the whole image. Mesa's software driver would
+        // treat the clear as a pass of its own and start its threads for it.
         let begins = !recorder.goes_on(&rendering) && !self.device.info().software;
         let cover_depth = p.clear_depth && !begins;
         if cover_depth {
@@ -266,7 +265,7 @@ impl Raster {
         Ok(())
     }
 
-    /// Uploads what the shaders read of a view and of its list.
+    /// Uploads the data of a view and of its list.
     fn upload_view(
         &mut self,
         recorder: &mut Recorder,
@@ -312,7 +311,7 @@ impl Raster {
         })
     }
 
-    /// Records the calls of a list, whose pipelines are made. State is set where it changes.
+    /// Records the calls of a list, whose pipelines exist, with state changes between them.
     fn draw_calls(
         &self,
         pass: &mut Pass<'_>,
@@ -332,12 +331,12 @@ impl Raster {
                 };
                 pass.bind_graphics(pipeline);
                 state = Some(call.state);
-                // Mesa's software driver forgets what was pushed for fragments when a pipeline without any was used
+                // Mesa's software driver drops fragment push constants after a pipeline that uses none
                 if overdraw != 0 {
                     pushed = 0;
                 }
             }
-            // every pipeline has the same layout, so what was pushed stays
+            // all pipelines share a layout, so push constants persist
             let wanted = match call.range {
                 DepthRange::Near => views.near,
                 _ => views.all,
@@ -355,7 +354,7 @@ impl Raster {
     }
 }
 
-/// The viewport of a part of the depth range.
+/// The viewport of a depth range.
 fn viewport(range: DepthRange, p: &ViewParameters<'_>) -> Viewport {
     let (min_depth, max_depth) = match range {
         DepthRange::Normal => (0.0, 1.0),
@@ -377,7 +376,7 @@ fn viewport(range: DepthRange, p: &ViewParameters<'_>) -> Viewport {
     }
 }
 
-/// The part of a rectangle that lies within the image.
+/// Clips a rectangle to the image.
 fn clip_to([x, y, width, height]: [i32; 4], image: &Image) -> [i32; 4] {
     let clip = |start: i32, size: i32, limit: u32| {
         let from = start.clamp(0, limit as i32);

@@ -1,12 +1,12 @@
-//! How often a pixel is drawn (`r_measureOverdraw`): counted by the fragment shaders of all draws, whether a fragment is
-//! in sight or not. The answer is that of the newest frame that is over, so that nothing waits for it.
+//! Overdraw (`r_measureOverdraw`): the fragment shaders of all draws count their fragments, hidden ones included. The
+//! result is that of the newest finished frame, so nothing waits for the GPU.
 
 use crate::gpu::{self, Access, Buffer, BufferDesc, BufferUsage, Memory, Recorder};
 
-/// Bytes of a counter.
+/// Size of a counter, bytes.
 const SIZE: u64 = 4;
 
-/// A number that fragments of one frame are added to. It is never set back: a frame's part is what it grew by.
+/// A counter of one frame in flight. It is never reset: the count of a frame is the difference.
 struct Counter {
     frame: u64,
     before: u32,
@@ -25,14 +25,14 @@ impl Counter {
 #[derive(Default)]
 pub struct Overdraw {
     counters: Vec<Counter>,
-    /// Of the newest frame that is over: its number and its fragments.
+    /// Number and fragments of the newest finished frame.
     newest: Option<(u64, u32)>,
-    /// Where the frame being recorded counts; 0: nowhere.
+    /// Address of the counter of the frame that is recorded; 0: not counted.
     address: u64,
 }
 
 impl Overdraw {
-    /// Begins a frame; `count`: its fragments are wanted. Frees what is not asked for.
+    /// Begins a frame. `count`: counts its fragments; otherwise frees the counters.
     ///
     /// # Errors
     /// Out of memory.
@@ -76,12 +76,12 @@ impl Overdraw {
         Ok(())
     }
 
-    /// Where fragments are counted in this frame; 0: nowhere.
+    /// Address of this frame's counter; 0: not counted.
     pub fn address(&self) -> u64 {
         self.address
     }
 
-    /// Fragments of the newest frame that is over; 0 while none was counted.
+    /// Fragments of the newest finished frame; 0 before the first.
     pub fn fragments(&self) -> u32 {
         self.newest.map_or(0, |(_, fragments)| fragments)
     }

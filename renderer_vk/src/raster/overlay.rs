@@ -1,4 +1,4 @@
-//! The 2D overlay: pictures in window pixels, drawn in the order of the calls, through the same draw list.
+//! The 2D overlay: pictures in window pixels, drawn in call order through the same draw list.
 
 use glam::{Vec2, Vec3};
 use shaders::types::constants as c;
@@ -13,19 +13,19 @@ use super::shading::{Shading, StageContext};
 use crate::assets::compile::sampler;
 use crate::assets::{Material, RasterPass};
 
-/// What a picture shows.
+/// Content of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Content {
     Material(u32),
-    /// A bindless texture, clamped and without mip levels, times the pictures' colours.
+    /// A bindless texture, clamped and without mip levels, times the picture's colour.
     Texture(u32),
-    /// The same as bright as white is before overbright bits (cinematics).
+    /// A texture at the brightness of white before overbright bits (cinematics).
     Film(u32),
-    /// The same, blended by its alpha.
+    /// A texture blended by its alpha.
     Transparent(u32),
 }
 
-/// A run of pictures with the same content.
+/// A run of pictures with equal content.
 #[derive(Clone, Copy, Debug)]
 struct Run {
     content: Content,
@@ -33,33 +33,33 @@ struct Run {
     count: u32,
 }
 
-/// The pictures queued since the last 3D view.
+/// Pictures queued since the last 3D view.
 #[derive(Default)]
 pub struct Overlay {
     vertices: Vec<Vertex>,
     runs: Vec<Run>,
 }
 
-/// A rectangle of window pixels (y down) with the texture coordinates of its corners.
+/// A rectangle in window pixels (y down), with texture coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct Picture2d {
     /// Left, top.
     pub position: Vec2,
-    /// Width and height; with one of them negative the picture's back is seen.
+    /// Width and height; if one is negative, the picture shows its back.
     pub size: Vec2,
-    /// Texture coordinates of the left top corner.
+    /// Texture coordinates of the upper left corner.
     pub st1: Vec2,
-    /// Texture coordinates of the right bottom corner.
+    /// Texture coordinates of the lower right corner.
     pub st2: Vec2,
     /// RGBA, red in the lowest byte.
     pub color: u32,
 }
 
-/// Where the upper or lower edge of a picture is put. An edge may run through the centres of a row of pixels, which
-/// menus and HUDs drawn for 640 x 480 do at many sizes of the window. Such a row then is that of the picture above the
-/// edge: OpenGL counts rows from below. Vulkan gives it to the one below, so the edge goes a part of a pixel further.
+/// Row coordinate of a picture's upper or lower edge. An edge may run through a row of pixel centres, as menus and HUDs
+/// designed for 640 × 480 do at many window sizes. In OpenGL, whose rows count from below, such a row belongs to the
+/// picture above the edge, in Vulkan to the one below; so the edge is moved down by a part of a pixel.
 fn row_edge(y: f32) -> f32 {
-    // positions are rounded to this part of a pixel before pixels are counted
+    // the rasterizer rounds positions to this grid, pixels
     const STEP: f32 = 1.0 / 256.0;
     let center = y.floor() + 0.5;
     if (y - center).abs() < STEP / 2.0 {
@@ -70,33 +70,33 @@ fn row_edge(y: f32) -> f32 {
 }
 
 impl Overlay {
-    /// Nothing is queued.
+    /// Whether nothing is queued.
     pub fn is_empty(&self) -> bool {
         self.runs.is_empty()
     }
 
-    /// Forgets what is queued.
+    /// Empties the queue.
     pub fn clear(&mut self) {
         self.vertices.clear();
         self.runs.clear();
     }
 
-    /// Queues a picture drawn with a material.
+    /// Queues a picture with a material.
     pub fn add(&mut self, material: u32, picture: &Picture2d) {
         self.push(Content::Material(material), picture);
     }
 
-    /// Queues a plain texture.
+    /// Queues a picture with a texture.
     pub fn add_texture(&mut self, texture: u32, picture: &Picture2d) {
         self.push(Content::Texture(texture), picture);
     }
 
-    /// Queues a picture of a film; its colour is of no account.
+    /// Queues a picture of a film; ignores its colour.
     pub fn add_film(&mut self, texture: u32, picture: &Picture2d) {
         self.push(Content::Film(texture), picture);
     }
 
-    /// Queues a plain texture that is blended by its alpha.
+    /// Queues a picture with a texture that is blended by its alpha.
     pub fn add_transparent_texture(&mut self, texture: u32, picture: &Picture2d) {
         self.push(Content::Transparent(texture), picture);
     }
@@ -129,7 +129,7 @@ impl Overlay {
         ]);
     }
 
-    /// The vertices and indices of a run.
+    /// Appends the vertices and indices of a run.
     fn geometry(&self, run: &Run, stages: &StageContext<'_>, time: f32, list: &mut DrawList) {
         let base = list.vertices.len() as u32;
         let first = run.first as usize * 4;
@@ -145,7 +145,7 @@ impl Overlay {
             list.indices.extend(indices.map(|i| base + i));
             return;
         };
-        // rare: scripts made for the world used in a menu
+        // rare: a menu uses a script written for the world
         let mut deformed: Vec<DeformVertex> = vertices
             .iter()
             .map(|v| DeformVertex {
@@ -179,7 +179,7 @@ impl Overlay {
         list.indices.extend(indices.iter().map(|i| base + i));
     }
 
-    /// Turns the queued pictures into draw calls. `instance` is [`overlay_instance`]'s.
+    /// Turns the queued pictures into draw calls. `instance`: index of [`overlay_instance`].
     pub fn draw(
         &self,
         list: &mut DrawList,
@@ -237,7 +237,7 @@ impl Overlay {
     }
 }
 
-/// State of a picture that nothing blends with.
+/// State of an opaque picture.
 const PLAIN: State = State {
     blend: None,
     depth: Depth::Always,
@@ -248,7 +248,7 @@ const PLAIN: State = State {
     shading: Shading::WHITE,
 };
 
-/// A pass of a material's picture.
+/// State of a pass of a material's picture.
 fn material_pass(
     material: &Material,
     pass: &RasterPass,
@@ -276,7 +276,7 @@ fn material_pass(
     (state, draw)
 }
 
-/// The one instance of the overlay: no transform, shader time in seconds. As the engine's entity for pictures it has
+/// The instance of the overlay: no transform, shader time in seconds. Like the engine's entity for pictures, it has
 /// neither colour nor light.
 pub fn overlay_instance(time: f32) -> Instance {
     Instance {

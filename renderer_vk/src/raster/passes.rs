@@ -1,19 +1,19 @@
-//! Passes of a material that one draw does together.
+//! Combines passes of a material into one draw.
 //!
-//! What a GPU needs for a draw that covers the picture is mostly the covering. So where a pass is blended over what the
-//! pass before it has just drawn, the fragment shader does both, and rounds in between as an image of 8 bits a channel
-//! does ([`Shading`](super::shading::Shading) tells it how). Surfaces of one material that lie in the same place to the
-//! bit make a difference: separate passes blend over each other there, and of these the last one stays.
+//! Most of the cost of a draw over the whole picture is the fill rate. So if a pass is blended over what the previous
+//! pass has just drawn, one fragment shader evaluates both ([`Shading`](super::shading::Shading)) and rounds in between
+//! as an image of 8 bits a channel does. The result differs only for surfaces of one material in exactly the same
+//! place: separate passes blend over each other, combined ones show the last surface only.
 //!
-//! Of the opaque surfaces with several passes in OpenArena's maps 98 % have up to four stages, which is as many as a
-//! draw takes.
+//! Of the opaque surfaces with several passes in OpenArena's maps, 98 % have up to four stages, the most that a draw
+//! takes.
 
 use shaders::types::DRAW_STAGES;
 use shaders::types::constants as c;
 
 use crate::assets::RasterPass;
 
-/// The draws that passes are done in, in order. `alone`: each pass in one of its own.
+/// Groups passes into draws, in order. `alone`: one pass a draw.
 pub(super) fn draws(passes: &[RasterPass], alone: bool) -> impl Iterator<Item = &[RasterPass]> {
     let first = if alone { 0 } else { together(passes) };
     let (together, rest) = passes.split_at(first);
@@ -21,8 +21,8 @@ pub(super) fn draws(passes: &[RasterPass], alone: bool) -> impl Iterator<Item = 
     together.into_iter().chain(rest.chunks(1))
 }
 
-/// How many of the first passes one draw can do. The first one has to overwrite what is there and leave its depth, so
-/// that those that follow pass where it did.
+/// Number of first passes that one draw can combine. The first must overwrite colour and write depth, so that the
+/// following ones pass the depth test exactly where it did.
 fn together(passes: &[RasterPass]) -> usize {
     let Some((first, rest)) = passes.split_first() else {
         return 0;
@@ -30,7 +30,7 @@ fn together(passes: &[RasterPass]) -> usize {
     if first.blend.is_some() || !first.depth_test || !first.depth_write {
         return 1;
     }
-    // in its holes the others would show, unless they ask for its depth
+    // later passes also draw in the first one's holes, unless they test for its depth
     let holes = first.alpha_func != c::ALPHAFUNC_NONE;
     let mut stages = first.stage_count as usize;
     let follows = |pass: &&RasterPass| {
@@ -78,7 +78,7 @@ mod tests {
         assert_eq!(lengths(&[SOLID], false), [1]);
         assert_eq!(lengths(&[SOLID, OVER, SOLID], false), [3]);
         assert_eq!(lengths(&[SOLID, OVER, SOLID], true), [1, 1, 1]);
-        // as many stages as there is room for
+        // as many stages as a draw takes
         assert_eq!(
             lengths(&[SOLID, OVER, OVER, OVER, OVER, OVER], false),
             [4, 1, 1]

@@ -1,4 +1,4 @@
-//! The pipelines of the classic look: one for each combination of state that a stage asks for, made when first used.
+//! The pipelines of the classic look, one for each draw state, created at first use.
 
 use std::collections::{HashMap, HashSet};
 
@@ -19,39 +19,39 @@ pub struct State {
     pub depth: Depth,
     /// Whether depth is written.
     pub depth_write: bool,
-    /// Faces that are not drawn.
+    /// Culled faces.
     pub cull: CullFaces,
     /// Decal offset.
     pub offset: bool,
-    /// Edges only.
+    /// Draws edges only.
     pub wireframe: bool,
-    /// What the shaders do.
+    /// Specialization of the shaders.
     pub shading: Shading,
 }
 
 /// Depth comparison of a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Depth {
-    /// None.
+    /// Always passes.
     Always,
-    /// Nearer or the same.
+    /// Nearer or equal.
     LessEqual,
-    /// The same.
+    /// Equal.
     Equal,
 }
 
-/// Which faces are dropped. The engine's front faces wind clockwise on the screen.
+/// Culled faces. The engine's front faces wind clockwise on the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum CullFaces {
     /// None.
     None,
-    /// Those that wind clockwise.
+    /// Faces that wind clockwise.
     Clockwise,
-    /// Those that wind counter-clockwise.
+    /// Faces that wind counter-clockwise.
     CounterClockwise,
 }
 
-/// The engine draws into a window without alpha, which reads as 1; the image here has one.
+/// The engine's window has no alpha channel, so destination alpha is 1; the image here has one.
 fn factor(blend: u32) -> BlendFactor {
     match blend {
         c::BLEND_ZERO | c::BLEND_ONE_MINUS_DST_ALPHA | c::BLEND_SRC_ALPHA_SATURATE => {
@@ -67,7 +67,7 @@ fn factor(blend: u32) -> BlendFactor {
     }
 }
 
-/// The pipelines made since the last call of [`keep`](Pipelines::keep), and those that it kept.
+/// Pipelines created or kept since the last call of [`keep`](Pipelines::keep).
 pub struct Pipelines {
     device: Device,
     offset: (f32, f32),
@@ -75,7 +75,7 @@ pub struct Pipelines {
 }
 
 impl Pipelines {
-    /// None yet; `offset` is the decals' factor and units.
+    /// No pipelines. `offset`: factor and units of the decals' depth offset.
     pub fn new(device: &Device, offset: (f32, f32)) -> Self {
         Self {
             device: device.clone(),
@@ -84,7 +84,7 @@ impl Pipelines {
         }
     }
 
-    /// Changes the decals' offset; pipelines made with another one are dropped.
+    /// Sets the decals' depth offset; drops pipelines with another one.
     pub fn set_offset(&mut self, offset: (f32, f32)) {
         if self.offset != offset {
             self.offset = offset;
@@ -92,17 +92,18 @@ impl Pipelines {
         }
     }
 
-    /// Drops the pipelines of all other states, those of earlier maps among them. Frames that still use one keep it.
+    /// Drops the pipelines of all other states, such as those of earlier maps. Frames in flight keep those that they
+    /// use.
     pub fn keep(&mut self, states: &HashSet<State>) {
         self.made.retain(|(_, state), _| states.contains(state));
     }
 
-    /// Whether the pipeline of `state` is there.
+    /// Whether the pipeline of `state` exists.
     pub fn is_made(&self, target: TargetKind, state: State) -> bool {
         self.made.contains_key(&(target, state))
     }
 
-    /// Makes the pipeline of `state` unless it is there.
+    /// Creates the pipeline of `state` unless it exists.
     ///
     /// # Errors
     /// The device cannot make it.
@@ -111,7 +112,7 @@ impl Pipelines {
             return Ok(());
         }
         let depth_alone = state.shading.mode == c::DRAW_DEPTH;
-        // a driver makes a pipeline the sooner the less there is in its shaders
+        // smaller shaders compile faster
         let modified = state.shading.tc_mods != 0;
         let many = state.shading.has_stages() || modified || target.counted;
         let vertex = if depth_alone {
@@ -148,7 +149,7 @@ impl Pipelines {
                     Depth::Equal => DepthTest::Equal,
                 },
                 depth_write: state.depth_write,
-                // gpu's front is counter-clockwise as it lies on the screen
+                // in `gpu`, front faces wind counter-clockwise on the screen
                 cull: match state.cull {
                     CullFaces::None => Cull::None,
                     CullFaces::Clockwise => Cull::Back,

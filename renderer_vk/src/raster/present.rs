@@ -1,4 +1,4 @@
-//! The last pass: the frame's picture onto the window, through overbright bits and gamma.
+//! The last pass: writes the frame to the window, with overbright bits and gamma.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -16,14 +16,14 @@ struct Parameters {
     srgb_target: u32,
 }
 
-/// Copies the frame to a target of one format.
+/// Presents a frame to targets of one format.
 pub struct Present {
     pipeline: GraphicsPipeline,
     format: Format,
 }
 
 impl Present {
-    /// For targets of `format`.
+    /// Creates the pipeline for targets of `format`.
     ///
     /// # Errors
     /// The device cannot make the pipeline.
@@ -47,13 +47,13 @@ impl Present {
         Ok(Self { pipeline, format })
     }
 
-    /// The format that it was made for.
+    /// Format of the targets.
     pub fn format(&self) -> Format {
         self.format
     }
 
-    /// Records the copy of `frame` to `target`: each channel becomes `c^(1/gamma) * 2^overbright_bits`. A frame in the
-    /// target's own format, where that is not [`super::COLOR_FORMAT`], is copied as it is.
+    /// Records the copy of `frame` to `target`: each channel becomes `c^(1/gamma) * 2^overbright_bits`. Copies a frame
+    /// unchanged if it has the target's format and that is not [`super::COLOR_FORMAT`].
     ///
     /// # Errors
     /// The device is out of memory.

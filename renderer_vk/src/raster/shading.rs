@@ -1,5 +1,5 @@
-//! What the shaders of a draw are specialised for, and what of a stage is the same over a whole draw: that is
-//! evaluated here, once, and neither per vertex nor per fragment.
+//! Specialization of a draw's shaders. Evaluates on the CPU, once, the stage values that are equal for all vertices of
+//! a draw.
 
 use glam::Vec2;
 use shaders::constant_ids::raster::draw as id;
@@ -11,18 +11,18 @@ use support::slice;
 use crate::assets::compile::sampler;
 use crate::assets::{Combine, Material, Materials, RasterPass, Samplers};
 
-/// Bits of a texture handle in [`Draw::textures`] that are the texture's; the sampler's lie above.
+/// Number of low bits of a handle in [`Draw::textures`] for the texture; the sampler is above.
 const TEXTURE_BITS: u32 = 24;
 
-/// A value below 16 of each stage of a draw, four bits each, the first's lowest.
+/// A value below 16 for each stage of a draw, four bits each; the first stage has the lowest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct PerStage(u32);
 
 impl PerStage {
-    /// Bits of a stage.
+    /// Number of bits of a stage.
     const BITS: usize = 4;
 
-    /// 0 for each stage.
+    /// 0 for all stages.
     const NONE: Self = Self(0);
 
     /// `value` for the first stage, 0 for the others.
@@ -36,33 +36,33 @@ impl PerStage {
     }
 }
 
-/// What a draw's shaders do. Every value is a specialization constant (`shaders/raster/draw.glsl`), so that a fragment
-/// pays for what its draw needs and not for all that any draw may need.
+/// Specialization of a draw's shaders. Every field is a specialization constant (`shaders/raster/draw.glsl`), so that a
+/// draw runs only the code it needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Shading {
     /// `DRAW_*`.
     pub mode: u32,
     /// `FOG_ADJUST_*` of the first stage.
     pub fog_adjust: u32,
-    /// There is a clip plane.
+    /// Uses a clip plane.
     pub clip: bool,
-    /// Bit i: stage i has a texture; otherwise it is white.
+    /// Bit i: stage i has a texture; without, it is white.
     pub textures: u32,
     /// Bit i: the `tcMod`s of stage i differ between vertices.
     pub tc_mods: u32,
     /// `COMBINE_*`.
     pub combine: PerStage,
-    /// `BLEND_*` of the source of a blended stage.
+    /// Source factor of a blended stage, `BLEND_*`.
     pub blend_source: PerStage,
-    /// `BLEND_*` of what a blended stage is blended with.
+    /// Destination factor of a blended stage, `BLEND_*`.
     pub blend_target: PerStage,
-    /// `ALPHAFUNC_*`, of the last stage of each pass.
+    /// `ALPHAFUNC_*`; of the last stage of each pass.
     pub alpha_func: PerStage,
     /// `COLOR_*`.
     pub color: PerStage,
-    /// `RGBGEN_*` of a colour per vertex.
+    /// `RGBGEN_*`, if the colour is evaluated per vertex.
     pub rgb_gen: PerStage,
-    /// `ALPHAGEN_*` of a colour per vertex.
+    /// `ALPHAGEN_*`, if alpha is evaluated per vertex.
     pub alpha_gen: PerStage,
     /// `TCGEN_*`.
     pub tc_gen: PerStage,
@@ -72,7 +72,7 @@ pub struct Shading {
 pub const CONSTANTS: usize = 13;
 
 impl Shading {
-    /// One colour, white.
+    /// Uniformly white.
     pub const WHITE: Self = Self {
         mode: c::DRAW_STAGE,
         fog_adjust: c::FOG_ADJUST_NONE,
@@ -89,32 +89,32 @@ impl Shading {
         tc_gen: PerStage::NONE,
     };
 
-    /// A dynamic light's spot.
+    /// The spot of a dynamic light.
     pub const LIGHT: Self = Self {
         mode: c::DRAW_LIGHT,
         textures: 1,
         ..Self::WHITE
     };
 
-    /// The vertices' colours.
+    /// Vertex colours.
     pub const VERTEX_COLOR: Self = Self {
         color: PerStage::first(c::COLOR_VERTEX),
         rgb_gen: PerStage::first(c::RGBGEN_EXACT_VERTEX),
         ..Self::WHITE
     };
 
-    /// The same with the second of two textures alone (`r_lightmap`).
+    /// The same, but shows only the second of two textures (`r_lightmap`).
     pub fn second_alone(mut self) -> Self {
         self.combine.set(1, c::COMBINE_REPLACE);
         self
     }
 
-    /// Whether it has several stages.
+    /// Whether the draw has several stages.
     pub fn has_stages(&self) -> bool {
         self.combine != PerStage::NONE
     }
 
-    /// The specialization constants: id and value.
+    /// The specialization constants, as id and value.
     pub fn constants(&self) -> [(u32, u32); CONSTANTS] {
         [
             (id::MODE, self.mode),
@@ -137,13 +137,13 @@ impl Shading {
 /// The colour of a stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct StageColor {
-    /// What of it is the same for every vertex; 1 where it is not.
+    /// Value shared by all vertices; 1 if they differ.
     flat: [f32; 4],
-    /// Whether it is white at all times.
+    /// Whether the colour is white in every frame.
     always_white: bool,
-    /// `RGBGEN_*` of a colour that differs between vertices.
+    /// `RGBGEN_*`, if vertices differ in colour.
     rgb_gen: Option<u32>,
-    /// `ALPHAGEN_*` of an alpha that does.
+    /// `ALPHAGEN_*`, if vertices differ in alpha.
     alpha_gen: Option<u32>,
 }
 
@@ -156,25 +156,25 @@ impl StageColor {
     };
 }
 
-/// What stages are evaluated with.
+/// Parameters for the evaluation of stages.
 #[derive(Clone, Copy)]
 pub struct StageContext<'a> {
     /// Materials.
     pub materials: &'a Materials,
-    /// Samplers in force.
+    /// Current samplers.
     pub samplers: &'a Samplers,
     /// 1 over 2 to the power of the overbright bits.
     pub identity_light: f32,
-    /// The spot that a dynamic light makes on a wall.
+    /// Texture of a dynamic light's spot.
     pub light_spot: u32,
-    /// Shown in place of every texture (`r_nobind`).
+    /// Replaces every texture (`r_nobind`).
     pub only_texture: Option<u32>,
 }
 
 impl StageContext<'_> {
-    /// The draw of passes of `material`'s on an instance: of one, or of several that go together
-    /// ([`super::passes`]). `draw` has what does not depend on the stages; `lightmap` is the page's texture or
-    /// `NO_TEXTURE`, `fog_adjust` one of `FOG_ADJUST_*`, of a single pass.
+    /// The draw of one pass, or of several that share a draw ([`super::passes`]), on an instance. `draw` has the values
+    /// that do not depend on stages; `lightmap` is the page's texture or `NO_TEXTURE`; `fog_adjust` is one of
+    /// `FOG_ADJUST_*`, for a single pass.
     pub fn passes(
         &self,
         material: &Material,
@@ -225,7 +225,7 @@ impl StageContext<'_> {
             }
             let color = match (part, script) {
                 (0, Some(script)) => self.color(script, instance, time),
-                // the colour of a pass is that of its first stage
+                // a pass has the colour of its first stage
                 _ => StageColor::WHITE,
             };
             draw.colors[place] = color.flat;
@@ -248,7 +248,7 @@ impl StageContext<'_> {
         (shading, draw)
     }
 
-    /// The draw of one texture, by a sampler ([`sampler`]), times the vertices' colours.
+    /// The draw of a texture with a sampler ([`sampler`]), times vertex colours.
     pub fn image(&self, texture: u32, kind: u32, draw: Draw) -> (Shading, Draw) {
         let shading = Shading {
             textures: 1,
@@ -257,8 +257,8 @@ impl StageContext<'_> {
         (shading, self.textured(texture, kind, draw))
     }
 
-    /// The draw of one texture, by a sampler, as bright as white is before overbright bits. Not the byte of that: the
-    /// engine hands this colour over as a number.
+    /// The draw of a texture with a sampler, at the brightness of white before overbright bits. That factor is not
+    /// rounded to a byte: the engine passes this colour as floats.
     pub fn plain_image(&self, texture: u32, kind: u32, draw: Draw) -> (Shading, Draw) {
         let light = self.identity_light;
         let shading = Shading {
@@ -294,7 +294,7 @@ impl StageContext<'_> {
         (shading, self.textured(picture, sampler::CLAMP, draw))
     }
 
-    /// The draw of a lightmap page alone.
+    /// The draw of a lightmap page only.
     pub fn lightmap(&self, texture: u32, draw: Draw) -> (Shading, Draw) {
         let shading = Shading {
             textures: 1,
@@ -304,7 +304,7 @@ impl StageContext<'_> {
         (shading, self.textured(texture, sampler::CLAMP, draw))
     }
 
-    /// The draw with one texture.
+    /// The draw, with one texture.
     fn textured(&self, texture: u32, kind: u32, mut draw: Draw) -> Draw {
         draw.textures[0] = self.handle(texture, kind);
         draw.texcoords[0] = UNCHANGED;
@@ -312,9 +312,9 @@ impl StageContext<'_> {
         draw
     }
 
-    /// A texture with a sampler ([`sampler`]).
+    /// Handle of a texture with a sampler ([`sampler`]).
     fn handle(&self, texture: u32, kind: u32) -> u32 {
-        // the spot is clamped, whatever it stands for
+        // the spot's sampler stays clamped, whatever its texture
         let (texture, kind) = match self.only_texture {
             Some(only) => (only, sampler::CLAMP),
             None => (texture, kind),
@@ -322,7 +322,7 @@ impl StageContext<'_> {
         texture & ((1 << TEXTURE_BITS) - 1) | self.samplers.index(kind) << TEXTURE_BITS
     }
 
-    /// The texture that a stage shows at a time; `None` for white.
+    /// The texture of a stage at a time; `None` for white.
     fn stage_texture(
         &self,
         stage: &shaders::types::Stage,
@@ -338,7 +338,7 @@ impl StageContext<'_> {
         let texture = match stage.image_count {
             0 => lightmap,
             count => {
-                // a float becomes the nearest integer there is, and no number is frame 0
+                // the conversion saturates; NaN gives frame 0
                 let frame = (time * stage.image_frequency).floor().max(0.0) as u64;
                 let frame = (frame % u64::from(count)) as u32;
                 let index = (stage.image_first + frame) as usize;
@@ -354,12 +354,12 @@ impl StageContext<'_> {
         let rgb = self.rgb(&stage.rgb_gen, instance.color, time);
         let mut alpha = alpha(&stage.alpha_gen, instance.color, time);
         if matches!(stage.alpha_gen, AlphaGen::Identity) {
-            // light and vertex colours may bring their own
+            // light and vertex colours may have their own alpha
             alpha.per_vertex = rgb.per_vertex.map(|_| c::ALPHAGEN_IDENTITY);
         }
         let ([r, g, b], [a]) = (rgb.flat, alpha.flat);
         StageColor {
-            // the engine keeps bytes; see `point_color` in material.glsl
+            // the engine stores bytes; see `point_color` in material.glsl
             flat: [r, g, b, a].map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.001).floor() / 255.0),
             always_white: rgb.always_white && alpha.always_white,
             rgb_gen: rgb.per_vertex,
@@ -403,13 +403,13 @@ fn alpha(alpha_gen: &AlphaGen, [.., a]: [f32; 4], time: f64) -> Channels<1> {
     }
 }
 
-/// Channels of a stage's colour: RGB, or alpha.
+/// Channels of a stage's colour: RGB or alpha.
 struct Channels<const N: usize> {
-    /// The value that all vertices of a draw share; 1 where vertices differ.
+    /// Value shared by all vertices of a draw; 1 if they differ.
     flat: [f32; N],
-    /// The value is 1 in every frame. White that changes is none, so that a pulse does not change the pipeline.
+    /// The value is 1 in every frame. False for waves that reach 1, so that a pulse does not change the pipeline.
     always_white: bool,
-    /// How the vertex shader evaluates them, where vertices differ.
+    /// Evaluation in the vertex shader, if vertices differ.
     per_vertex: Option<u32>,
 }
 
@@ -439,30 +439,30 @@ impl<const N: usize> Channels<N> {
     }
 }
 
-/// The stages of passes: the pass, and which of its two it is.
+/// The stages of passes: each pass with the index of the stage in it.
 fn parts(passes: &[RasterPass]) -> impl Iterator<Item = (&RasterPass, usize)> {
     let stages = |pass: &RasterPass| 0..pass.stages.len().min(pass.stage_count as usize);
     (passes.iter()).flat_map(move |pass| stages(pass).map(move |part| (pass, part)))
 }
 
-/// A time as the engine has it. Its clock counts milliseconds, which 32-bit seconds only come near to, and the engine's
-/// tables are read at steps that whole milliseconds fall on.
+/// A time of the engine. Its clock counts milliseconds, which `f32` seconds only approximate, and its wave tables have
+/// steps at whole milliseconds.
 fn seconds(time: f32) -> f64 {
     let near = f64::from(time);
     let whole = (near * 1000.0).round() / 1000.0;
     if whole as f32 == time { whole } else { near }
 }
 
-/// The script's stage of a GPU stage.
+/// The script's stage for a GPU stage.
 fn script_stage(material: &Material, index: u32) -> Option<&shaderscript::Stage> {
     let place = index.checked_sub(material.stage_first)?;
     material.shader.stages.get(place as usize)
 }
 
-/// [`Draw::texcoords`] of no `tcMod`.
+/// [`Draw::texcoords`] without a `tcMod`.
 const UNCHANGED: [f32; 6] = [1.0, 0.0, 0.0, 1.0, 0.0, 0.0];
 
-/// What `tcMod`s come to, as in [`Draw::texcoords`]; `None` when they differ between vertices.
+/// `tcMod`s as [`Draw::texcoords`]; `None` if they differ between vertices.
 fn affine(tc_mods: &[TcMod], time: f64, entity_st: Vec2) -> Option<[f32; 6]> {
     if tc_mods.is_empty() {
         return Some(UNCHANGED);

@@ -1,5 +1,5 @@
-//! Stencil shadows of the classic look (`cg_shadows 2`): volumes count in the stencil, then what lies in them is
-//! darkened at once.
+//! Stencil shadows of the classic look (`cg_shadows 2`): shadow volumes change the stencil, then one draw darkens the
+//! pixels inside.
 //!
 //! Source: engine behaviour of `renderer_opengl1` (stencil shadows).
 
@@ -17,9 +17,9 @@ use crate::gpu::{
 };
 use crate::scene::{ShadowVolumes, View};
 
-/// Brightness of what lies in shadow.
+/// Brightness factor in shadow.
 const SHADE: f32 = 0.6;
-/// Distance from the camera, units, at which the engine draws the shade: what is nearer stays bright.
+/// Distance from the camera at which the engine draws the shade, units; nearer surfaces stay bright.
 const SHADE_DISTANCE: f32 = 10.0;
 
 #[repr(C)]
@@ -30,9 +30,9 @@ struct VolumeParameters {
     positions: u64,
 }
 
-/// The pipelines for one kind of target.
+/// The pipelines of a kind of target.
 struct Made {
-    /// Draws the sides that wind counter-clockwise and the others, each counting up and down.
+    /// For faces of counter-clockwise and of clockwise winding, each incrementing and decrementing.
     up: [GraphicsPipeline; 2],
     down: [GraphicsPipeline; 2],
     shade: GraphicsPipeline,
@@ -79,14 +79,14 @@ pub struct Shadows {
     made: HashMap<TargetKind, Made>,
 }
 
-/// Volumes in memory that the GPU reads.
+/// Shadow volumes in GPU memory.
 pub struct Uploaded {
     positions: u64,
     indices: (Buffer, u64),
 }
 
 impl Shadows {
-    /// Makes what [`draw`](Self::draw) needs.
+    /// Creates the pipelines for [`draw`](Self::draw).
     ///
     /// # Errors
     /// The device is out of memory or cannot make a pipeline.
@@ -106,7 +106,7 @@ impl Shadows {
         Ok(Uploaded { positions, indices })
     }
 
-    /// Draws the volumes of a view over its picture, and the shade. The stencil must be clear.
+    /// Draws the volumes of a view over its picture, then the shade. The stencil must be clear.
     pub fn draw(
         &self,
         pass: &mut Pass<'_>,

@@ -1,7 +1,7 @@
 //! The sky of the classic look: a box around the camera, cloud layers projected from a sphere onto it, and the sun.
 //!
-//! Source: the engine's sky as described in its behaviour: faces and their texture axes, a dome over a planet of
-//! radius 4096 for the clouds, depth at the far end.
+//! Source: engine behaviour of `renderer_opengl1`: faces and their texture axes, a dome over a planet of radius 4096
+//! for the clouds, depth at the far end.
 
 use glam::{Vec2, Vec3};
 use shaders::types::Vertex;
@@ -9,10 +9,10 @@ use shaderscript::Sky;
 
 use crate::scene::{Cells, SKY_CELLS, SUN_SIZE, View, perpendicular};
 
-/// Radius of the planet under the clouds, units.
+/// Radius of the planet below the clouds, units.
 const PLANET_RADIUS: f32 = 4096.0;
 
-/// Coordinates on the cloud layer in `direction` (any length), clouds `height` above the ground.
+/// Coordinates of the cloud layer in a direction (of any length); `height` of the clouds above the ground.
 pub fn cloud_coordinates(direction: Vec3, height: f32) -> Vec2 {
     let r = PLANET_RADIUS;
     let d2 = direction.length_squared();
@@ -22,16 +22,16 @@ pub fn cloud_coordinates(direction: Vec3, height: f32) -> Vec2 {
     Vec2::new(v.x.clamp(-1.0, 1.0).acos(), v.y.clamp(-1.0, 1.0).acos())
 }
 
-/// Which coordinates a face gets.
+/// Texture coordinates of a face.
 #[derive(Clone, Copy, Debug)]
 pub enum Coordinates {
-    /// The box's image of that face.
+    /// Of the box's image.
     Box,
-    /// The cloud layer at this height.
+    /// Of the cloud layer at this height, units.
     Clouds(f32),
 }
 
-/// Vertices and indices that are drawn into.
+/// Vertices and indices to append to.
 pub struct Mesh<'a> {
     /// All vertices.
     pub vertices: &'a mut Vec<Vertex>,
@@ -40,7 +40,7 @@ pub struct Mesh<'a> {
 }
 
 impl Mesh<'_> {
-    /// Appends the given cells of a face of the box around a view's camera and returns the range of their indices.
+    /// Appends the given cells of a face of the box around the camera, and returns their range of indices.
     pub fn append_face(
         &mut self,
         face: usize,
@@ -81,7 +81,7 @@ impl Mesh<'_> {
         (first_index, self.indices.len() as u32 - first_index)
     }
 
-    /// Appends the quad of a sun in `direction` (unit length) and returns the range of its indices.
+    /// Appends the quad of a sun in `direction` (unit length), and returns its range of indices.
     pub fn append_sun(&mut self, direction: Vec3, view: &View) -> (u32, u32) {
         let first_vertex = self.vertices.len() as u32;
         let first_index = self.indices.len() as u32;
@@ -116,7 +116,7 @@ mod tests {
         // straight up, the unit vector to the layer is (0, 0, 1), whose x and y are 0: acos 0
         let uv = cloud_coordinates(Vec3::Z, 512.0);
         assert!((uv - Vec2::splat(std::f32::consts::FRAC_PI_2)).length() < 1e-6);
-        // to the east the layer is met at sqrt(2 R h + h^2) units
+        // towards +x, the layer is sqrt(2 R h + h^2) units away
         let uv = cloud_coordinates(Vec3::X, 512.0);
         let reach = (2.0_f32 * 4096.0 * 512.0 + 512.0 * 512.0).sqrt();
         let expected = (reach / (4096.0 + 512.0)).acos();

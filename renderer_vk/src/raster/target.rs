@@ -1,35 +1,35 @@
-//! Where the classic look draws.
+//! Targets of the classic look.
 
 use crate::gpu::{ColorMask, Format, Image};
 
-/// Where a view is drawn.
+/// Target images of a view.
 #[derive(Clone, Copy)]
 pub struct Target<'a> {
     /// Colour, 8 bits a channel.
     pub color: &'a Image,
-    /// Depth, with a stencil or without, with as many samples as the colour.
+    /// Depth, with or without stencil, with as many samples as the colour.
     pub depth: &'a Image,
-    /// Channels that are drawn.
+    /// Channels to write.
     pub mask: ColorMask,
 }
 
-/// What pipelines are made for.
+/// Properties of a target that pipelines depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct TargetKind {
     /// Format of the colour image.
     pub color: Format,
     /// Format of the depth image.
     pub depth: Format,
-    /// Samples of a pixel.
+    /// Samples a pixel.
     pub samples: u32,
-    /// Channels that are drawn.
+    /// Channels to write.
     pub mask: ColorMask,
-    /// Fragments are counted (`r_measureOverdraw`).
+    /// Counts fragments (`r_measureOverdraw`).
     pub counted: bool,
 }
 
 impl Target<'_> {
-    /// What pipelines for it are made for.
+    /// The properties that pipelines depend on.
     pub fn kind(&self) -> TargetKind {
         TargetKind {
             color: self.color.format(),

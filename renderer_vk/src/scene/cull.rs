@@ -1,7 +1,7 @@
-//! What lies outside of a view: spheres and boxes against the planes of its pyramid, and models by both.
+//! Culls spheres, boxes and models by the planes of the frustum.
 //!
-//! Source: engine behaviour of `renderer_opengl1` (culling of models): the spheres that a model's frames name decide
-//! where they can, its boxes do otherwise. Both are what the file says, right or wrong.
+//! Source: engine behaviour of `renderer_opengl1` (culling of models): the spheres of a model's frames decide where
+//! possible, otherwise its boxes. Both are used as stored, even if they do not bound the model.
 
 use glam::{Vec3, Vec4};
 use q3model::Frame;
@@ -9,18 +9,18 @@ use support::Aabb;
 
 use crate::api::RefEntity;
 
-/// How something lies to the view's pyramid.
+/// Position relative to the frustum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Lies {
-    /// Wholly within.
+    /// Completely inside.
     Inside,
-    /// Perhaps cut by it.
+    /// May cross a plane.
     Across,
-    /// Wholly without.
+    /// Completely outside.
     Outside,
 }
 
-/// A sphere, by planes that point inwards (`xyz.p >= w` is inside).
+/// Tests a sphere by planes that face inwards (`xyz.p >= w` is inside).
 pub(super) fn sphere(centre: Vec3, radius: f32, planes: &[Vec4]) -> Lies {
     let mut lies = Lies::Inside;
     for plane in planes {
@@ -35,7 +35,7 @@ pub(super) fn sphere(centre: Vec3, radius: f32, planes: &[Vec4]) -> Lies {
     lies
 }
 
-/// A box of any orientation, by its corners.
+/// Tests a box of any orientation by its corners.
 pub(super) fn corners(corners: &[Vec3; 8], planes: &[Vec4]) -> Lies {
     let mut lies = Lies::Inside;
     for plane in planes {
@@ -49,7 +49,7 @@ pub(super) fn corners(corners: &[Vec3; 8], planes: &[Vec4]) -> Lies {
     lies
 }
 
-/// The corners of a box in an entity's space.
+/// World-space corners of a box in an entity's space.
 pub(super) fn placed(entity: &RefEntity, bounds: &Aabb) -> [Vec3; 8] {
     bounds.corners().map(|corner| to_world(entity, corner))
 }
@@ -59,8 +59,8 @@ fn to_world(entity: &RefEntity, point: Vec3) -> Vec3 {
     entity.origin + x * point.x + y * point.y + z * point.z
 }
 
-/// What was found of a model between two frames: by its spheres, unless its axes are of another length or the frames
-/// differ, and by its box where these do not decide.
+/// Result for a model between two key frames: by the frames' spheres, unless the axes are scaled or the spheres differ,
+/// and by the box if the spheres do not decide.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct ModelLies {
     pub by_sphere: Option<Lies>,
@@ -68,13 +68,13 @@ pub(super) struct ModelLies {
 }
 
 impl ModelLies {
-    /// Whether nothing of it is drawn.
+    /// Whether the model is culled.
     pub fn is_outside(self) -> bool {
         self.by_sphere == Some(Lies::Outside) || self.by_box == Some(Lies::Outside)
     }
 }
 
-/// A model of key frames between two of them.
+/// Tests a model between two key frames.
 pub(super) fn model(entity: &RefEntity, new: &Frame, old: &Frame, planes: &[Vec4]) -> ModelLies {
     let by_frame =
         |frame: &Frame| sphere(to_world(entity, frame.local_origin), frame.radius, planes);
@@ -92,7 +92,7 @@ pub(super) fn model(entity: &RefEntity, new: &Frame, old: &Frame, planes: &[Vec4
 mod tests {
     use super::*;
 
-    /// Everything with a positive x.
+    /// The half space of positive x.
     const PLANE: [Vec4; 1] = [Vec4::new(1.0, 0.0, 0.0, 0.0)];
 
     fn frame(x: f32, radius: f32, size: f32) -> Frame {
@@ -131,20 +131,20 @@ mod tests {
     #[test]
     fn spheres_decide_before_boxes() {
         let lies = |entity: &RefEntity, new: &Frame, old: &Frame| model(entity, new, old, &PLANE);
-        // the sphere is out of sight, whatever the box says
+        // the sphere is outside, the box is not
         let small = frame(0.0, 1.0, 90.0);
         assert!(lies(&entity(-5.0), &small, &small).is_outside());
-        // it is in sight, though the box is not
+        // the sphere is inside, the box is not
         let boxless = frame(20.0, 1.0, 2.0);
         assert!(!lies(&entity(-5.0), &boxless, &boxless).is_outside());
-        // axes of another length say nothing about spheres
+        // scaled axes: spheres do not decide
         let stretched = RefEntity {
             non_normalized_axes: true,
             ..entity(-5.0)
         };
         assert!(!lies(&stretched, &small, &small).is_outside());
         assert!(lies(&stretched, &boxless, &boxless).is_outside());
-        // frames that disagree leave it to the box around both
+        // the frames differ: the box of both decides
         let found = lies(&entity(-5.0), &small, &boxless);
         assert_eq!((found.by_sphere, found.is_outside()), (None, false));
         assert_eq!(found.by_box, Some(Lies::Across));

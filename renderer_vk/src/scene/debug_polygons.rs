@@ -1,26 +1,26 @@
-//! Polygons that the engine's collision code wants to see (`r_debugSurface`).
+//! Debug polygons of the engine's collision code (`r_debugSurface`).
 
 use glam::{Vec2, Vec3};
 use shaders::types::Vertex;
 
-/// Polygons of one view, in the space of the map.
+/// Polygons of a view, world space.
 #[derive(Clone, Debug, Default)]
 pub struct DebugPolygons {
-    /// Corners of all polygons, in their colour.
+    /// Corners of all polygons, with their colour.
     pub vertices: Vec<Vertex>,
     /// Number of corners of each polygon.
     pub sizes: Vec<u32>,
 }
 
 impl DebugPolygons {
-    /// Forgets all.
+    /// Removes all polygons.
     pub fn clear(&mut self) {
         self.vertices.clear();
         self.sizes.clear();
     }
 
-    /// Adds a convex polygon unless `camera` sees it from behind: a front winds clockwise. Of `color` the lowest three
-    /// bits are red, green and blue.
+    /// Adds a convex polygon if it faces `camera`: its front winds clockwise. The lowest three bits of `color` are red,
+    /// green and blue.
     pub fn add(&mut self, color: u32, corners: &[Vec3], camera: Vec3) {
         let [a, b, c, ..] = *corners else { return };
         let normal = (c - a).cross(b - a);

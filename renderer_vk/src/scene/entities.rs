@@ -1,4 +1,4 @@
-//! Entities of a view: brush models and what is built on the spot; models of triangles are in `models`.
+//! Adds entities other than triangle models: brush models, sprites, beams, rails, lightning.
 
 use glam::Vec3;
 use shaders::types::constants as c;
@@ -23,7 +23,7 @@ impl Gatherer<'_> {
         if first_person && self.view.is_portal {
             return;
         }
-        // in the main view they only cast shadows, which the classic look does not draw
+        // in the main view they cast shadows only, which the classic look does not draw
         let third_person = entity.renderfx & renderfx::THIRD_PERSON != 0;
         let hidden = third_person && !self.view.is_portal && !self.traced;
         match entity.kind {
@@ -53,7 +53,7 @@ impl Gatherer<'_> {
         let instance = count(out.instances.len());
         let mut placed = entity::effect_instance(entity, &self.view, out.time);
         if self.traced && entity.kind == EntityKind::Sprite {
-            // in the air light comes from all sides: half of what has a direction reaches what is seen
+            // a sprite has no normal: it receives half of the directed light
             let light = self.light_at(entity.origin);
             placed.ambient = ((light.ambient + light.directed * 0.5) / 255.0).min(Vec3::ONE);
             placed.flags |= c::INSTANCE_SUSPENDED;
@@ -92,11 +92,11 @@ impl Gatherer<'_> {
             Some(model @ (Model::Mesh { .. } | Model::Mdr(_) | Model::Iqm(_))) => {
                 self.add_animated(number, entity, hidden, model, out);
             }
-            // seen everywhere, whatever the entity asks for
+            // the engine ignores `renderfx` of brush models
             Some(Model::Inline { model, .. }) => self.add_brush_model(number, entity, *model, out),
             None if hidden => {}
             None => {
-                // lines in world space: their width is the view's
+                // lines in world space, because their width depends on the view
                 let instance = count(out.instances.len());
                 out.instances
                     .push(entity::effect_instance(entity, &self.view, out.time));
@@ -109,14 +109,14 @@ impl Gatherer<'_> {
                     let mut raw = RawMesh::begin(out, axes, instance, 0);
                     raw.paths = paths;
                     out.builder().axes(entity, &view);
-                    // the engine lists it under its default material
+                    // the engine sorts it by the default material
                     self.finish_and_list(raw, 0, number, Some(entity), out);
                 }
             }
         }
     }
 
-    /// The light that the engine gives to an entity at a place.
+    /// Light of an entity at a position, by the engine's rules.
     fn light_at(&self, at: Vec3) -> GridLight {
         lighting::entity_light(
             self.input.world,
@@ -162,7 +162,7 @@ impl Gatherer<'_> {
             return;
         };
         let Some(brush) = world.models.get(model as usize).copied() else {
-            // The game names a model that the map does not have.
+            // the map has no such model
             return;
         };
         if self.culls_box(entity, &brush.bounds) {
@@ -182,11 +182,11 @@ impl Gatherer<'_> {
             LookPartMut::Classic(classic) => {
                 let mut lights = std::mem::take(&mut self.scratch.lights);
                 surfaces::local_lights(self.lights, entity.origin, &entity.axis, &mut lights);
-                // a model that no light reaches has surfaces that none reaches; of the lights that reach one the
-                // engine keeps no more than whether there are any, which stands for the first of the view
+                // If no light reaches the model's box, no surface is lit. Otherwise the engine keeps one bit for all
+                // lights: that of the view's first light.
                 let reached = surfaces::lights_at(&lights, &brush.bounds) != 0;
                 lights.truncate(usize::from(reached));
-                // its box was tested; its surfaces are tested by facing alone
+                // the model's box was tested; its surfaces are culled by facing only
                 let placed = slice::get(&out.instances, instance as usize);
                 let local = LocalView {
                     camera: placed.map_or(Vec3::ZERO, |i| i.viewer),

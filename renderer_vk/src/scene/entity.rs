@@ -1,4 +1,4 @@
-//! An entity as an instance.
+//! Converts entities to instances.
 
 use glam::Vec3;
 use shaders::types::{Instance, constants as c};
@@ -7,13 +7,13 @@ use super::View;
 use crate::api::{RefEntity, renderfx};
 use crate::world::GridLight;
 
-/// The world itself: no transform, no colour, no light of its own.
+/// The instance of the world: no transform, no colour, no entity light.
 pub(super) fn world_instance(view: &View, time: f32) -> Instance {
     Instance {
         axis: [Vec3::X, Vec3::Y, Vec3::Z],
         origin: Vec3::ZERO,
         viewer: view.origin,
-        // the engine's world entity is all zero: `rgbGen entity` is black there
+        // the engine's world entity is all zero, so `rgbGen entity` is black
         color: [0.0; 4],
         time,
         flags: c::INSTANCE_UNLIT,
@@ -21,7 +21,7 @@ pub(super) fn world_instance(view: &View, time: f32) -> Instance {
     }
 }
 
-/// `INSTANCE_*` bits of an entity's flags.
+/// The `INSTANCE_*` bits of an entity.
 fn flags(entity: &RefEntity) -> u32 {
     [
         (renderfx::DEPTH_HACK, c::INSTANCE_DEPTH_HACK),
@@ -39,7 +39,7 @@ fn color(entity: &RefEntity) -> [f32; 4] {
     entity.shader_rgba.map(|byte| f32::from(byte) / 255.0)
 }
 
-/// An entity whose geometry is built in world space: sprites, beams, rails.
+/// Instance of an entity with geometry in world space: sprite, beam, rail.
 pub(super) fn effect_instance(entity: &RefEntity, view: &View, time: f32) -> Instance {
     Instance {
         color: color(entity),
@@ -50,7 +50,7 @@ pub(super) fn effect_instance(entity: &RefEntity, view: &View, time: f32) -> Ins
     }
 }
 
-/// A model in its own space. `added`: the part of its ambient light that is no light of the place.
+/// Instance of a model. `added`: constant part of its ambient light, which comes from no light source.
 pub(super) fn model_instance(
     entity: &RefEntity,
     view: &View,
@@ -60,7 +60,7 @@ pub(super) fn model_instance(
 ) -> Instance {
     let axis = entity.axis;
     let into_axes = |v: Vec3| Vec3::new(v.dot(axis[0]), v.dot(axis[1]), v.dot(axis[2]));
-    // the engine divides by the length of the first axis once, which is right for evenly scaled axes
+    // the engine divides by the length of the first axis: correct for uniform scale
     let scale = if entity.non_normalized_axes {
         let length = axis[0].length();
         if length > 0.0 { 1.0 / length } else { 0.0 }
@@ -82,13 +82,13 @@ pub(super) fn model_instance(
     }
 }
 
-/// A point of an instance's space in world space.
+/// Transforms a point from instance space to world space.
 pub(super) fn to_world(instance: &Instance, p: Vec3) -> Vec3 {
     let [x, y, z] = instance.axis;
     instance.origin + x * p.x + y * p.y + z * p.z
 }
 
-/// A world direction by an instance's axes.
+/// A world direction along the axes of an instance.
 pub(super) fn into_axes(instance: &Instance, v: Vec3) -> Vec3 {
     let [x, y, z] = instance.axis;
     Vec3::new(v.dot(x), v.dot(y), v.dot(z))

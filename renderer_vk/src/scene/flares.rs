@@ -1,7 +1,7 @@
-//! Flares in sight: what the engine draws where a lamp can be seen.
+//! Finds the flares of a view.
 //!
-//! Source: engine behaviour of `renderer_opengl1` (flares). Whether a lamp can be seen is found on the GPU, from the
-//! depth of the view that was just drawn or by a ray.
+//! Source: engine behaviour of `renderer_opengl1` (flares). The GPU tests occlusion, by the depth of the view that was
+//! just drawn or by a ray.
 
 use glam::{Vec2, Vec3};
 use q3bsp::SurfaceKind;
@@ -15,23 +15,23 @@ use crate::assets::grey;
 use crate::settings::Settings;
 use crate::world::WorldData;
 
-/// How far a flare may be behind what is seen at its place and still show, units.
+/// Distance behind the visible surface at which a flare still shows, units.
 const SLACK: f32 = 24.0;
-/// The engine's `r_flareCoeff` where it is 0.
+/// Value of `r_flareCoeff` that replaces 0, as in the engine.
 const DEFAULT_COEFFICIENT: i32 = 150;
 
-/// A flare in sight, as far as the depth at its place is not asked.
+/// A flare in the frustum, before the occlusion test.
 #[derive(Clone, Copy, Debug)]
 pub struct ViewFlare {
-    /// The map's surface.
+    /// Index of the map's surface.
     pub surface: u32,
-    /// Entity that the surface belongs to, or the world.
+    /// Index of the instance that places the surface.
     pub instance: u32,
-    /// Without slot.
+    /// Its parameters; the slot is set later.
     pub flare: types::Flare,
 }
 
-/// How a view shows flares.
+/// Parameters for the flares of a view.
 pub(super) struct FlareView<'a> {
     pub view: &'a View,
     pub world: &'a WorldData,
@@ -39,7 +39,7 @@ pub(super) struct FlareView<'a> {
 }
 
 impl FlareView<'_> {
-    /// The flare of a surface placed by an instance, if it is in sight. `instance` is the number of `placed`.
+    /// The flare of a surface placed by an instance, if it is in the frustum. `instance`: index of `placed`.
     pub fn find(&self, surface: u32, instance: u32, placed: &types::Instance) -> Option<ViewFlare> {
         let stored = slice::get(&self.world.surfaces, surface as usize)?;
         if stored.kind != SurfaceKind::Flare {
@@ -57,7 +57,7 @@ impl FlareView<'_> {
 
     fn shown(&self, flare: &Flare, placed: &types::Instance) -> Option<types::Flare> {
         let view = self.view;
-        // turned away it does not show; the engine forgets the entity's place here
+        // flares that face away are omitted; the engine compares without the entity's transform
         let facing = if flare.normal == Vec3::ZERO {
             1.0
         } else {
@@ -74,7 +74,7 @@ impl FlareView<'_> {
             return None;
         }
         let [x, y, width, height] = view.viewport;
-        // the engine counts pixels from the lower left corner, and rounds up from the middle of one
+        // the engine counts pixels from the lower left corner and rounds to the nearest
         let pixel = |ndc: f32, size: i32| ((1.0 + ndc) * 0.5 * size as f32 + 0.5).floor() as i32;
         let column = pixel(clip.x / clip.w, width);
         let row = pixel(-clip.y / clip.w, height);
@@ -99,7 +99,7 @@ impl FlareView<'_> {
         let intensity = coefficient * size * size / (spread * spread);
         let color = flare.color * facing * intensity * 255.0 * self.through_fog(flare.fog, at);
         let color = grey(color, self.settings.greyscale);
-        // a negative coefficient has no root
+        // a negative coefficient has no square root
         if !(color.is_finite() && size.is_finite()) {
             return None;
         }
@@ -116,7 +116,7 @@ impl FlareView<'_> {
         })
     }
 
-    /// What fog volume `fog` (plus one; 0 none) leaves of light from a point.
+    /// Transmittance of fog volume `fog` (plus one; 0: no fog) from a point to the camera.
     fn through_fog(&self, fog: u32, point: Vec3) -> f32 {
         let volume = fog
             .checked_sub(1)
@@ -125,8 +125,7 @@ impl FlareView<'_> {
     }
 }
 
-/// How much of its colour a fog volume gives a point: the engine's table, whose coordinates are the view depth and the
-/// depth below the fog's surface.
+/// Opacity of a fog volume at a point, by the engine's table of view depth and depth below the fog's surface.
 fn fog_factor(fog: &types::Fog, view: &View, point: Vec3) -> f32 {
     let mut s = (point - view.origin).dot(view.axis[0]) / (8.0 * fog.depth);
     let [nx, ny, nz, dist] = fog.plane;

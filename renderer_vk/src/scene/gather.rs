@@ -1,4 +1,4 @@
-//! One view gathered: the world, polygons, entities, in the engine's order.
+//! Gathers a view: world, polygons, entities, in the engine's order.
 
 use glam::{Vec3, Vec4};
 use q3model::BoneMatrix;
@@ -24,13 +24,13 @@ use super::{
 use crate::api::{DynamicLight, PolyVert, RefDef, RefEntity, rdflags, renderfx};
 use crate::world::{VisibleQuery, VisibleSet, WorldData};
 
-/// Stands for the map in the numbers of meshes: models have positive handles.
+/// Model number of the map in [`MeshId`]; handles of models are positive.
 const WORLD_MODEL: i32 = -1;
 
 /// Distance of the far plane without a world, units.
 const FAR_WITHOUT_WORLD: f32 = 2048.0;
 
-/// Memory that gathering reuses.
+/// Buffers that gathering reuses.
 #[derive(Default)]
 pub(super) struct Scratch {
     deform: DeformScratch,
@@ -43,7 +43,7 @@ pub(super) struct Scratch {
 }
 
 impl Scratch {
-    /// Sorts surfaces by their keys; those of equal keys stay in order. The library's own stable sort takes memory.
+    /// Stable sort by key. The standard library's stable sort allocates.
     fn sort(&mut self, surfaces: &mut Vec<super::DrawSurface>) {
         self.order.clear();
         self.order
@@ -59,13 +59,12 @@ impl Scratch {
     }
 }
 
-/// The views of a scene in the classic look: at most one through a portal or mirror, then the main one.
+/// The views of a scene in the classic look: at most one through a portal or mirror, then the main view.
 pub(super) fn classic_views(
     scene: &mut Scene,
     input: &GatherInput<'_>,
     def: &RefDef,
 ) -> Vec<ClassicScene> {
-    // New lists if none can be used again.
     let mut out = scene.lists.pop().unwrap_or_default();
     let main = classic_view(
         scene,
@@ -101,7 +100,7 @@ fn classic_view(
     out
 }
 
-/// The view of a scene in the traced look, with all portals and mirrors that it may meet.
+/// The view of a scene in the traced look, with all portals and mirrors that its rays may hit.
 pub(super) fn traced_view(scene: &mut Scene, input: &GatherInput<'_>, def: &RefDef) -> TracedScene {
     let view = main_view(scene, input, def);
     let portals = portal::find_all(&scene.entities, input, def);
@@ -115,18 +114,18 @@ pub(super) fn traced_view(scene: &mut Scene, input: &GatherInput<'_>, def: &RefD
     out
 }
 
-/// The view that the game asks for.
+/// The main view.
 fn main_view(scene: &Scene, input: &GatherInput<'_>, def: &RefDef) -> View {
     let stereo = scene.eye.stereo(input.settings);
     View::new(def, input.settings.znear, FAR_WITHOUT_WORLD).with_stereo(stereo)
 }
 
-/// A length as the GPU counts.
+/// A length as `u32`.
 pub(super) fn count(n: usize) -> u32 {
     u32::try_from(n).unwrap_or(u32::MAX)
 }
 
-/// Everything that one view is gathered from.
+/// State of gathering one view.
 pub(super) struct Gatherer<'a> {
     pub(super) input: &'a GatherInput<'a>,
     pub(super) entities: &'a [RefEntity],
@@ -139,12 +138,12 @@ pub(super) struct Gatherer<'a> {
     /// The view is traced; otherwise it is rasterized.
     pub(super) traced: bool,
     pub(super) view: View,
-    /// The views through portals, by the numbers of their paths: what turns to the camera turns to these, too.
+    /// The views through portals, by path number; geometry that faces the camera is built for each.
     turned: &'a [Option<View>],
-    /// The world, when the view shows it.
+    /// The world, if the view shows it.
     pub(super) world: Option<&'a WorldData>,
     pub(super) frustum: [Vec4; 4],
-    /// The frustum counts: not for the traced look, whose rays go anywhere.
+    /// Culls by the frustum; false in the traced look, whose rays leave it.
     pub(super) culling: bool,
 }
 
@@ -222,15 +221,14 @@ impl<'a> Gatherer<'a> {
         }
     }
 
-    /// What the classic look does to a gathered view: greyscale, the order of drawing, counts.
+    /// Finishes a view of the classic look: greyscale, drawing order, counts.
     fn sort_and_count(&mut self, out: &mut ClassicScene) {
         let greyscale = self.input.settings.greyscale.clamp(0.0, 1.0);
         if greyscale > 0.0 {
             out.take_color(greyscale);
         }
-        // equal keys keep the order of submission
         self.scratch.sort(&mut out.look.surfaces);
-        // of skies that lie behind each other the one that is drawn last shows: they write no depth
+        // skies write no depth: of overlapping skies, the last one drawn shows
         let materials = self.input.materials;
         (out.look.skies).sort_unstable_by_key(|sky| (materials.rank(sky.material), sky.fog));
         if self.input.settings.speeds != 0 {
@@ -256,7 +254,7 @@ impl<'a> Gatherer<'a> {
             .push(entity::world_instance(&self.view, out.time));
     }
 
-    /// The sun's disc where it is asked for; the game may have no material for it.
+    /// The sun's disc if it is drawn; the game may have no material for it.
     fn sun(&self) -> Option<Sun> {
         let world = self.world.filter(|_| self.input.settings.draw_sun)?;
         Some(Sun {
@@ -265,12 +263,12 @@ impl<'a> Gatherer<'a> {
         })
     }
 
-    /// The frustum's planes; none when nothing is culled.
+    /// Planes of the frustum; empty without culling.
     pub(super) fn planes(&self) -> &[Vec4] {
         if self.culling { &self.frustum } else { &[] }
     }
 
-    /// Finds the visible surfaces and sets the far plane to the farthest corner of what is visible.
+    /// Finds the visible surfaces, and sets the far plane to the farthest corner of their bounds.
     fn find_visible(&mut self, world: &WorldData, pvs_origin: Vec3, out: &mut ViewScene) {
         let settings = self.input.settings;
         let frustum: &[Vec4] = if settings.no_cull { &[] } else { &self.frustum };
@@ -343,7 +341,7 @@ impl<'a> Gatherer<'a> {
         self.scratch.lights = lights;
     }
 
-    /// Adds the flares among some surfaces, placed by an instance.
+    /// Adds the flares among `surfaces`, placed by an instance.
     pub(super) fn add_flares(
         &self,
         world: &WorldData,
@@ -398,7 +396,7 @@ impl<'a> Gatherer<'a> {
         })
     }
 
-    /// Copies surfaces of the map into the view's vertices and deforms them. Empties `pending`.
+    /// Copies surfaces of the map into the view and deforms them. Empties `pending`.
     pub(super) fn add_deformed(
         &mut self,
         world: &WorldData,
@@ -445,7 +443,7 @@ impl<'a> Gatherer<'a> {
         }
     }
 
-    /// On how many ways the camera may see an entity: one, if it does not turn to the eye, or is seen straight on alone.
+    /// Number of copies of an entity's geometry: one, unless it faces the camera and portals show it.
     pub(super) fn ways_of(&self, entity: &RefEntity, turns: bool) -> usize {
         let first_person = entity.renderfx & renderfx::FIRST_PERSON != 0;
         if turns && !first_person {
@@ -455,7 +453,7 @@ impl<'a> Gatherer<'a> {
         }
     }
 
-    /// One of so many ways; `None` if nothing is seen on it.
+    /// The path numbers and the view of copy `index` of `ways`; `None` if no path leads there.
     pub(super) fn way(&self, index: usize, ways: usize) -> Option<Way> {
         let Some(index) = index.checked_sub(1) else {
             return Some(Way {
@@ -492,8 +490,8 @@ impl<'a> Gatherer<'a> {
         )
     }
 
-    /// Finishes a mesh that is no world surface and lists it for the classic look. `asked` is the material before
-    /// remapping, which decides the order.
+    /// Finishes a mesh that is no world surface, and lists it for the classic look. `asked`: material before remapping,
+    /// which decides the order.
     pub(super) fn finish_and_list(
         &mut self,
         raw: RawMesh,
@@ -510,7 +508,7 @@ impl<'a> Gatherer<'a> {
         }
     }
 
-    /// Polygons, each a fan; neighbours of one material and fog become one mesh.
+    /// Adds the polygons as fans; neighbours of one material and fog become one mesh.
     fn add_polys(&mut self, out: &mut ViewScene) {
         let mut open: Option<(RawMesh, u32)> = None;
         let polys = self.polys;
@@ -539,7 +537,7 @@ impl<'a> Gatherer<'a> {
     }
 }
 
-/// A convex polygon as a fan of triangles with its plane's normal.
+/// Appends a convex polygon as a fan of triangles with the normal of its plane.
 fn append_fan(corners: &[PolyVert], out: &mut ViewScene) {
     let base = count(out.vertices.len());
     let normal = match corners {

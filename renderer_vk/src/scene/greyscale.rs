@@ -1,7 +1,7 @@
-//! `r_greyscale` on what a view is drawn with besides images.
+//! `r_greyscale` for the colours of a view; images have it from loading.
 //!
-//! Source: engine behaviour of `renderer_opengl1`: it takes the colour out of what each stage computes. Everything that
-//! stages compute from is linear in these colours, so it is taken out of them.
+//! Source: engine behaviour of `renderer_opengl1`, which desaturates the result of each stage. Stages are linear in the
+//! colours of their inputs, so the inputs are desaturated here.
 
 use glam::Vec3;
 use support::slice::{part_mut, span};
@@ -10,8 +10,8 @@ use super::ClassicScene;
 use crate::assets::{desaturate, grey};
 
 impl ClassicScene {
-    /// Takes this share (0 to 1) of the colour out of entities, their light, polygons and dynamic lights. The map's
-    /// vertices lost it when they were loaded.
+    /// Desaturates entities, their light, polygons and dynamic lights by `amount` (0 to 1). The map's vertices were
+    /// desaturated when the map was loaded.
     pub(super) fn take_color(&mut self, amount: f32) {
         for instance in &mut self.instances {
             let [r, g, b, a] = instance.color;

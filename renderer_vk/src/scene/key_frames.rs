@@ -1,4 +1,4 @@
-//! Key-framed models: which frames, which level of detail, and the vertices between two frames.
+//! Key-framed models: frames, level of detail, interpolated vertices.
 //!
 //! Source: engine behaviour of `renderer_opengl1` (model surfaces).
 
@@ -12,10 +12,10 @@ use super::View;
 use crate::api::{RefEntity, renderfx};
 use crate::settings::Settings;
 
-/// Largest `r_lodscale` that counts.
+/// Upper limit of `r_lodscale`.
 const MAX_LOD_SCALE: f32 = 20.0;
 
-/// The frames to draw between, and the weight of the old one.
+/// The two key frames of an entity, and the weight of the previous one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Frames {
     pub new: usize,
@@ -24,7 +24,8 @@ pub(super) struct Frames {
 }
 
 impl Frames {
-    /// Of an entity on a model of `count` frames: wrapped if it says so, both 0 if either does not exist.
+    /// The key frames of an entity with a model of `count` frames: wrapped if the entity asks for it; both 0 if either
+    /// is out of range.
     pub fn of(entity: &RefEntity, count: usize) -> Self {
         let frame = |frame: i32| {
             let frame = i64::from(frame);
@@ -54,7 +55,7 @@ impl Frames {
     }
 }
 
-/// The level of detail of a model with `levels` of them: by the size of its frame on the screen.
+/// Level of detail of a model with `levels` of them, by the projected size of its frame.
 pub(super) fn level_of_detail(
     levels: usize,
     frame: &Frame,
@@ -73,7 +74,7 @@ pub(super) fn level_of_detail(
     } else {
         (radius / (view.tan_y * distance)).min(1.0)
     };
-    // a model behind the camera gets the finest level, as one whose projected size is zero
+    // a model behind the camera has projected size 0, which selects the finest level
     let level = if size == 0.0 {
         0.0
     } else {
@@ -84,8 +85,8 @@ pub(super) fn level_of_detail(
     clamp(chosen + i64::from(settings.lod_bias))
 }
 
-/// Sines of the 256 angles of a packed normal, as the engine reads them in a table of 1024 whose last entry is the
-/// first one again: a little more than the angle's own.
+/// Sines of the 256 angles of a packed normal. The engine's table has 1024 entries over 1023 steps, so its angles are
+/// 1024/1023 of the exact ones.
 fn sines() -> &'static [f32; 256] {
     static TABLE: OnceLock<[f32; 256]> = OnceLock::new();
     TABLE.get_or_init(|| {
@@ -93,7 +94,7 @@ fn sines() -> &'static [f32; 256] {
     })
 }
 
-/// The normal of a packed vertex: nearly [`PackedVertex::normal`], by table.
+/// The normal of a packed vertex by that table; [`PackedVertex::normal`] is exact.
 fn normal(vertex: PackedVertex, sines: &[f32; 256]) -> Vec3 {
     let [longitude, latitude] = vertex.normal.to_le_bytes();
     let sine = |angle: u8| sines[usize::from(angle)];
@@ -105,7 +106,7 @@ fn normal(vertex: PackedVertex, sines: &[f32; 256]) -> Vec3 {
     )
 }
 
-/// Appends the vertices of a surface between two frames, in the model's space, white.
+/// Appends the vertices of a surface between two frames: model space, white.
 pub(super) fn append_vertices(surface: &Surface, frames: Frames, out: &mut Vec<Vertex>) {
     let sines = sines();
     let new = surface.frame_vertices(frames.new);

@@ -1,4 +1,4 @@
-//! Light on entities: the light grid, the engine's constant part, dynamic lights.
+//! Light on entities: light grid, the engine's constant part, dynamic lights.
 //!
 //! Source: engine behaviour of `renderer_opengl1` (entity lighting, `LightForPoint`).
 
@@ -8,19 +8,19 @@ use crate::api::DynamicLight;
 use crate::settings::Settings;
 use crate::world::{GridLight, WorldData};
 
-/// Ambient and directed light where there is no grid, of 255.
+/// Ambient and directed light without a light grid, 0 to 255.
 const NO_GRID: f32 = 150.0;
-/// Ambient light that is always added, of 255.
+/// Ambient light that is always added, 0 to 255.
 const MINIMUM: f32 = 32.0;
-/// Strength of a dynamic light of radius 1 at distance 1, of 255; also the least distance that counts.
+/// Light of a dynamic light of radius 1 at distance 1, 0 to 255; also the least distance, units.
 const DYNAMIC_AT_RADIUS: f32 = 16.0;
 
-/// The part of [`entity_light`]'s ambient light that is no light of the place, of 255.
+/// The constant part of [`entity_light`]'s ambient light, 0 to 255.
 pub(super) fn added(settings: &Settings) -> f32 {
     MINIMUM * settings.identity_light()
 }
 
-/// Light on an entity at `point`, world directions, 0..255 scale. `has_world`: the view shows the world.
+/// Light on an entity at `point`: world directions, 0 to 255. `has_world`: the view shows the world.
 pub(super) fn entity_light(
     world: Option<&WorldData>,
     has_world: bool,
@@ -47,7 +47,7 @@ pub(super) fn entity_light(
         light.directed += strength * dynamic.color;
         direction += strength * to_light.normalize_or_zero();
     }
-    // the engine keeps this limit in whole numbers
+    // the engine truncates this limit to an integer
     light.ambient = light.ambient.min(Vec3::splat((255.0 * identity).trunc()));
     light.direction = direction.normalize_or_zero();
     light
@@ -79,14 +79,14 @@ mod tests {
             |x| entity_light(None, false, Vec3::ZERO, &[lamp(x)], &settings).directed - 150.0;
         assert!(directed(100.0).abs_diff_eq(Vec3::new(64.0, 32.0, 0.0), 1e-3));
         assert!(directed(200.0).abs_diff_eq(Vec3::new(16.0, 8.0, 0.0), 1e-3));
-        // nearer than 16 units it grows no more
+        // below 16 units the light is constant
         assert_eq!(directed(1.0), directed(16.0));
         let light = entity_light(None, false, Vec3::ZERO, &[lamp(100.0)], &settings);
         assert!(light.direction.abs_diff_eq(Vec3::X, 1e-6));
     }
 
-    /// The engine's rules once more, in the order of their description and in double precision: ambient and directed
-    /// light as bytes, and the direction.
+    /// Reference implementation of the engine's rules in double precision: ambient and directed light as bytes, and the
+    /// direction.
     fn described(
         grid: &[(Vec3, [u8; 8])],
         size: Vec3,

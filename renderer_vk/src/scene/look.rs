@@ -1,4 +1,4 @@
-//! Parts of a view that a single look reads.
+//! Parts of a view that one look reads.
 
 use std::sync::Arc;
 
@@ -7,18 +7,18 @@ use super::{
     ViewScene, VisibleSky,
 };
 
-/// A view that is rasterized: the surfaces in the frustum, sorted; a portal or mirror has its own view.
+/// A view of the classic look: the sorted surfaces in the frustum. A portal or mirror has a view of its own.
 pub type ClassicScene = ViewScene<ClassicPart>;
 
-/// A view that is traced: all moving geometry, in sight or not.
+/// A view of the traced look: all moving geometry, in the frustum or not.
 pub type TracedScene = ViewScene<TracedPart>;
 
-/// Data for the classic look alone.
+/// Data for the classic look.
 #[derive(Clone, Debug, Default)]
 pub struct ClassicPart {
     /// Visible surfaces in drawing order.
     pub surfaces: Vec<DrawSurface>,
-    /// The skies in sight, each material once with each fog.
+    /// Visible skies, one for each pair of material and fog.
     pub skies: Vec<VisibleSky>,
     /// Shadow volumes of models (`cg_shadows 2`).
     pub shadows: ShadowVolumes,
@@ -28,35 +28,35 @@ pub struct ClassicPart {
     pub statistics: Statistics,
 }
 
-/// Data for the traced look alone.
+/// Data for the traced look.
 #[derive(Clone, Debug, Default)]
 pub struct TracedPart {
-    /// Meshes that keep their shape, see [`Shape::Rigid`](super::Shape::Rigid); one may occur many times.
+    /// Rigid meshes, see [`Shape::Rigid`](super::Shape::Rigid); meshes of the view share them.
     pub rigid: Vec<Arc<RigidMesh>>,
     /// Inline models.
     pub submodels: Vec<Submodel>,
-    /// The entities that added something, in the game's order.
+    /// Entities that added geometry, in the game's order.
     pub entities: Vec<ViewEntity>,
-    /// Numbers of the world's surfaces in the visible set: those that show through a sky.
+    /// Numbers of the world's surfaces in the visible set, which may show through a sky.
     pub potential: Vec<u32>,
-    /// Portals and mirrors that the view may meet.
+    /// Portals and mirrors that rays may hit.
     pub portals: Vec<Portal>,
 }
 
-/// A look's part of a view, for code that gathers views of both looks.
+/// The part of a view for one look, for code that gathers views of both.
 pub trait LookPart {
-    /// The part, to be filled.
+    /// The part, for writing.
     fn part(&mut self) -> LookPartMut<'_>;
 
-    /// Empties it; its memory is used again.
+    /// Empties it, but keeps its buffers.
     fn clear(&mut self);
 }
 
-/// A look's part of a view, by the look.
+/// The part of a view, by look.
 pub enum LookPartMut<'a> {
-    /// The view is rasterized.
+    /// Of a view of the classic look.
     Classic(&'a mut ClassicPart),
-    /// The view is traced.
+    /// Of a view of the traced look.
     Traced(&'a mut TracedPart),
 }
 

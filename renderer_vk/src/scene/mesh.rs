@@ -1,4 +1,4 @@
-//! Meshes that move: finished (deformed) and put on the view's lists.
+//! Finishes moving meshes: deforms them and lists them in the view.
 
 use glam::Vec3;
 use shaders::types::Vertex;
@@ -12,7 +12,7 @@ use super::{DynamicMesh, LookPartMut, Shape, View, ViewScene, turned};
 use crate::api::{RefDef, RefEntity};
 use crate::assets::Materials;
 
-/// Memory for deforming, reused.
+/// Buffers for deforming.
 #[derive(Default)]
 pub(super) struct DeformScratch {
     vertices: Vec<DeformVertex>,
@@ -20,29 +20,29 @@ pub(super) struct DeformScratch {
     lightmaps: Vec<glam::Vec2>,
 }
 
-/// A mesh whose raw vertices and indices were just appended to a view.
+/// A mesh, before deformation, at the end of a view's vertices and indices.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RawMesh {
-    /// Length of [`ViewScene::vertices`] before.
+    /// Its first vertex in [`ViewScene::vertices`].
     pub first_vertex: usize,
-    /// Length of [`ViewScene::indices`] before.
+    /// Its first index in [`ViewScene::indices`].
     pub first_index: usize,
-    /// Index of the material that is drawn.
+    /// Index of the material, after remapping.
     pub material: u32,
     /// Index of its instance.
     pub instance: u32,
     /// Fog volume plus one.
     pub fog: u32,
-    /// World surface that it is the copy of.
+    /// Index of the world surface that it is a copy of.
     pub world_surface: Option<u32>,
-    /// How much of it is the same in the next frame.
+    /// Part of the mesh that stays the same in the next frame.
     pub shape: Shape,
-    /// Which paths meet it, see [`turned`].
+    /// Paths that hit the mesh, see [`turned`].
     pub paths: u8,
 }
 
 impl RawMesh {
-    /// A mesh that begins here.
+    /// A mesh that begins at the current end.
     pub fn begin(out: &ViewScene, material: u32, instance: u32, fog: u32) -> Self {
         Self {
             first_vertex: out.vertices.len(),
@@ -58,7 +58,7 @@ impl RawMesh {
 }
 
 impl ViewScene {
-    /// What meshes are appended with.
+    /// Builder that appends to the view.
     pub(super) fn builder(&mut self) -> MeshBuilder<'_> {
         MeshBuilder {
             vertices: &mut self.vertices,
@@ -66,7 +66,7 @@ impl ViewScene {
         }
     }
 
-    /// Adds the shadow volumes of a mesh, before it is deformed; the traced look has none.
+    /// Adds the shadow volumes of a mesh before deformation, in the classic look.
     pub(super) fn add_shadow_volumes(&mut self, raw: &RawMesh) {
         let (
             LookPartMut::Classic(classic),
@@ -90,8 +90,8 @@ impl ViewScene {
     }
 }
 
-/// Deforms what was appended since `raw` began, as `view` sees it, and lists it. `None` when nothing is left of it, or
-/// some position is not a number.
+/// Deforms the mesh `raw`, which ends at the current end, for `view`, and lists it. `None` if no triangle remains or a
+/// position is not finite.
 pub(super) fn finish(
     raw: RawMesh,
     entity: Option<&RefEntity>,
@@ -108,7 +108,7 @@ pub(super) fn finish(
     let vertex_count = out.vertices.len() - raw.first_vertex;
     let index_count = out.indices.len() - raw.first_index;
     let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
-    // an acceleration structure must not meet what is not a number
+    // acceleration structures require finite positions
     let finite = out
         .vertices
         .get(raw.first_vertex..)
@@ -190,7 +190,7 @@ fn deform(
     eval::deform(&material.shader.deforms, vertices, indices, &context);
     out.vertices.truncate(raw.first_vertex);
     out.indices.truncate(raw.first_index);
-    // deformations that rebuild quads give them both coordinates alike
+    // deformations that rebuild quads write the same values to both texture coordinates
     let rebuilt = (material.shader.deforms.iter())
         .any(|deform| matches!(deform, Deform::AutoSprite | Deform::Text(_)));
     out.vertices

@@ -1,8 +1,8 @@
-//! One view as the game described it, gathered for drawing: what both looks read.
+//! Gathers the game's scene into views, which both looks draw.
 //!
-//! The front end's calls fill a [`Scene`]; `RenderScene` turns what was added since the last one into a [`ViewScene`]:
-//! instances, the vertices of everything that moves or deforms (evaluated on the CPU, in the space of their
-//! instance), and the sorted list of visible surfaces that the classic look draws.
+//! The front end's calls fill a [`Scene`]. `RenderScene` turns what was added since the last view into a [`ViewScene`]:
+//! instances, the vertices of moving and deformed geometry (evaluated on the CPU, in instance space), and the sorted
+//! list of visible surfaces of the classic look.
 
 mod cull;
 mod debug_polygons;
@@ -49,18 +49,17 @@ pub use sky::{CELLS as SKY_CELLS, Cells, FACES as SKY_FACES, SkyCoverage, Visibl
 pub use statistics::Statistics;
 pub use view::View;
 
-/// Where a surface's triangles are.
+/// Location of a surface's triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Geometry {
-    /// In the world's static buffers: a range of the static index buffer, whose indices count from the start of the
-    /// static vertex buffer.
+    /// A range of the world's static index buffer; indices count from the start of the static vertex buffer.
     Static {
         /// First index.
         first_index: u32,
         /// Number of indices.
         index_count: u32,
     },
-    /// In [`ViewScene::indices`], whose indices count from the start of [`ViewScene::vertices`].
+    /// A range of [`ViewScene::indices`], which count from the start of [`ViewScene::vertices`].
     Dynamic {
         /// First index.
         first_index: u32,
@@ -69,31 +68,31 @@ pub enum Geometry {
     },
 }
 
-/// One visible surface of the classic look.
+/// A visible surface of the classic look.
 #[derive(Clone, Copy, Debug)]
 pub struct DrawSurface {
-    /// The engine's order: sort value, material's creation order, entity, fog, dynamic light. Equal keys keep the
-    /// order of submission.
+    /// Drawing order of the engine: sort value, creation order of the material, entity, fog, dynamic light. Surfaces of
+    /// equal keys are drawn in the order of submission.
     pub sort_key: u64,
-    /// Index of the material (remapping already applied).
+    /// Index of the material, after remapping.
     pub material: u32,
     /// Index into [`ViewScene::instances`].
     pub instance: u32,
-    /// Fog volume plus one; 0 none.
+    /// Fog volume plus one; 0: no fog.
     pub fog: u32,
     /// Bindless texture index of the lightmap page, or `NO_TEXTURE`.
     pub lightmap: u32,
-    /// Bit i: touched by `dlights[i]` (the first 32, as in the engine).
+    /// Bit i: `dlights[i]` reaches the surface (the first 32, as in the engine).
     pub dlights: u32,
-    /// Its triangles.
+    /// Location of its triangles.
     pub geometry: Geometry,
-    /// A flat surface of the map, whose triangles tend to hide much.
+    /// A flat surface of the map; such surfaces are likely occluders.
     pub flat: bool,
-    /// Square of how near a surface of the map comes to the eye, by its box, units²; of others 0.
+    /// Squared distance from the camera to the bounding box of a surface of the map, units²; 0 for others.
     pub distance_squared: f32,
 }
 
-/// A mesh of this view that moves: an entity's surface, a polygon, a deformed surface of the world.
+/// A moving mesh of this view: a surface of an entity, a polygon, or a deformed surface of the world.
 #[derive(Clone, Copy, Debug)]
 pub struct DynamicMesh {
     /// First index in [`ViewScene::indices`].
@@ -104,33 +103,33 @@ pub struct DynamicMesh {
     pub first_vertex: u32,
     /// Number of vertices.
     pub vertex_count: u32,
-    /// Index of the material (remapping already applied).
+    /// Index of the material, after remapping.
     pub material: u32,
-    /// Index into [`ViewScene::instances`]; its flags say who sees the mesh.
+    /// Index into [`ViewScene::instances`], whose flags limit the rays that hit the mesh.
     pub instance: u32,
-    /// Fog volume plus one; 0 none.
+    /// Fog volume plus one; 0: no fog.
     pub fog: u32,
-    /// The index of the world surface that this mesh is the deformed copy of.
+    /// Index of the world surface from which this mesh was deformed.
     pub world_surface: Option<u32>,
-    /// How much of it is the same in the next frame.
+    /// Part of the mesh that stays the same in the next frame.
     pub shape: Shape,
-    /// Which paths of the traced look meet it: those of one of the numbers of [`turned`].
+    /// Paths of the traced look that hit the mesh, as numbered in [`turned`].
     pub paths: u8,
 }
 
-/// The triangles of a mesh, wherever they are kept; in the space of its instance.
+/// The triangles of a mesh, in the space of its instance.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshGeometry<'a> {
     /// Vertices.
     pub vertices: &'a [Vertex],
     /// Indices, three a triangle: `vertices[index - base]`.
     pub indices: &'a [u32],
-    /// What the indices count from.
+    /// Number of the first vertex.
     pub base: u32,
 }
 
 impl MeshGeometry<'_> {
-    /// Triangles as indices into `vertices`; those that point elsewhere are left out.
+    /// Triangles as indices into `vertices`; omits those with an index out of range.
     pub fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
         let corner = |i: u32| {
             let local = i.checked_sub(self.base)?;
@@ -141,7 +140,7 @@ impl MeshGeometry<'_> {
     }
 }
 
-/// An inline model of the map (`*n`) placed in this view.
+/// An inline model of the map (`*n`), placed in this view.
 #[derive(Clone, Copy, Debug)]
 pub struct Submodel {
     /// Index of the BSP model.
@@ -150,11 +149,11 @@ pub struct Submodel {
     pub instance: u32,
 }
 
-/// What an entity put into a view, and what tells it from others: the traced look finds it again in the next frame,
-/// since the engine's entities have no names.
+/// The geometry that an entity added to a view. Engine entities have no names, so the traced look matches those of two
+/// frames by the fields of this structure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewEntity {
-    /// What it is.
+    /// Kind of the entity.
     pub kind: EntityKind,
     /// Handle of its model.
     pub model: i32,
@@ -164,11 +163,11 @@ pub struct ViewEntity {
     pub material: i32,
     /// Its `renderfx` bits.
     pub renderfx: u32,
-    /// Key frame.
+    /// Current key frame.
     pub frame: i32,
-    /// Key frame before.
+    /// Previous key frame.
     pub old_frame: i32,
-    /// Where it is.
+    /// Position, world space.
     pub origin: Vec3,
     /// Its first instance in [`ViewScene::instances`].
     pub first_instance: u32,
@@ -180,14 +179,14 @@ pub struct ViewEntity {
     pub mesh_count: u32,
 }
 
-/// A portal or mirror plane of this view with the transform of what is seen through it.
+/// A portal or mirror of this view, with the transform to the view that it shows.
 #[derive(Clone, Copy, Debug)]
 pub struct Portal {
     /// Plane of the surface: `xyz.p = w`.
     pub plane: Vec4,
-    /// A mirror reflects; otherwise the far camera is seen.
+    /// A mirror reflects; a portal shows the view of its far camera.
     pub mirror: bool,
-    /// A point of the plane and its frame (axis 0 = normal).
+    /// A point of the plane, with its frame (axis 0: the normal).
     pub surface_origin: Vec3,
     /// See `surface_origin`.
     pub surface_axis: [Vec3; 3],
@@ -197,11 +196,11 @@ pub struct Portal {
     pub camera_axis: [Vec3; 3],
     /// Origin for the potentially visible set.
     pub pvs_origin: Vec3,
-    /// Where the entity that marks the surface is.
+    /// Position of the entity that marks the surface.
     pub entity_origin: Vec3,
 }
 
-/// Half the side of the sun's picture, as a part of its distance.
+/// Half the side of the sun's quad over its distance.
 pub const SUN_SIZE: f32 = 0.1;
 
 /// The sun's disc.
@@ -209,42 +208,41 @@ pub const SUN_SIZE: f32 = 0.1;
 pub struct Sun {
     /// Index of the material.
     pub material: u32,
-    /// Unit vector towards it.
+    /// Unit vector towards the sun.
     pub direction: Vec3,
 }
 
-/// One view: what both looks read, and the part `L` that one look reads. `ViewScene` without `L` is a view of either
-/// look, for code that serves both.
+/// A view: data that both looks read, and the part `L` for one look. `ViewScene` without `L` is a view of either look.
 #[derive(Clone, Debug)]
 pub struct ViewScene<L: ?Sized = dyn LookPart> {
-    /// The view as the game asked for it.
+    /// The game's parameters of the view.
     pub def: RefDef,
     /// Camera, projection, viewport.
     pub view: View,
     /// Seconds.
     pub time: f32,
-    /// `[0]` is the world.
+    /// Instances; `[0]` is the world.
     pub instances: Vec<Instance>,
-    /// Vertices of what moves, in the space of their mesh's instance.
+    /// Vertices of moving meshes, in the space of their instances.
     pub vertices: Vec<Vertex>,
-    /// Indices of what moves.
+    /// Indices of moving meshes.
     pub indices: Vec<u32>,
-    /// What moves. For the traced look these are all meshes of the view; for the classic look those not culled.
+    /// Moving meshes: in the traced look all of the view, in the classic look those not culled.
     pub meshes: Vec<DynamicMesh>,
     /// Dynamic lights.
     pub dlights: Vec<DynamicLight>,
-    /// The world is part of the view.
+    /// The view shows the world.
     pub has_world: bool,
-    /// The sun's disc, when it is to be drawn wherever a sky is in sight.
+    /// The sun's disc, if it is drawn where a sky is visible.
     pub sun: Option<Sun>,
-    /// Flares in sight (`r_flares`).
+    /// Visible flares (`r_flares`), before occlusion.
     pub flares: Vec<ViewFlare>,
-    /// What one look alone reads.
+    /// Data for one look.
     pub look: L,
 }
 
 impl ClassicScene {
-    /// The indices of a surface of the view. `static_indices` is the world's index array.
+    /// The indices of a surface. `static_indices`: the world's index array.
     pub fn indices_of<'a>(&'a self, surface: &DrawSurface, static_indices: &'a [u32]) -> &'a [u32] {
         let (source, first, count) = match surface.geometry {
             Geometry::Static {
@@ -261,7 +259,7 @@ impl ClassicScene {
 }
 
 impl TracedScene {
-    /// The vertices of a mesh, and its indices, which count from [`MeshGeometry::base`].
+    /// The vertices and indices of a mesh.
     pub fn mesh_geometry(&self, mesh: &DynamicMesh) -> MeshGeometry<'_> {
         if let Shape::Rigid(rigid) = mesh.shape {
             let rigid = self.look.rigid.get(rigid as usize);
@@ -280,7 +278,7 @@ impl TracedScene {
 }
 
 impl<L: Default> ViewScene<L> {
-    /// Nothing, seen by a camera.
+    /// A view without content.
     pub(crate) fn empty(def: &RefDef, view: View) -> Self {
         Self {
             def: *def,
@@ -299,10 +297,10 @@ impl<L: Default> ViewScene<L> {
     }
 }
 
-/// What a scene is gathered from.
+/// Input of gathering.
 #[derive(Clone, Copy)]
 pub struct GatherInput<'a> {
-    /// The map, if one is loaded (also for views without it).
+    /// The map, if one is loaded, even if the view does not show it.
     pub world: Option<&'a WorldData>,
     /// Materials.
     pub materials: &'a Materials,
@@ -315,7 +313,7 @@ pub struct GatherInput<'a> {
 }
 
 impl<'a> GatherInput<'a> {
-    /// From a registration.
+    /// The input from the game's registered assets.
     pub fn new(world: Option<&'a World>, assets: &'a Assets, settings: &'a Settings) -> Self {
         Self {
             world: world.map(|world| &world.data),
@@ -327,7 +325,7 @@ impl<'a> GatherInput<'a> {
     }
 }
 
-/// A polygon that the game added.
+/// A polygon added by the game.
 #[derive(Clone, Copy, Debug)]
 struct Poly {
     /// Index of the material, before remapping.
@@ -336,7 +334,7 @@ struct Poly {
     vertex_count: usize,
 }
 
-/// What the game added since the last view, and memory that views reuse.
+/// Content that the game added since the last view, and buffers that later views reuse.
 #[derive(Default)]
 pub struct Scene {
     entities: Vec<RefEntity>,
@@ -347,17 +345,17 @@ pub struct Scene {
     portal_visible: VisibleSet,
     classic_pool: Vec<ClassicScene>,
     traced_pool: Vec<TracedScene>,
-    /// Empty lists of views, for their memory.
+    /// Empty lists, kept for their allocations.
     lists: Vec<Vec<ClassicScene>>,
     scratch: gather::Scratch,
-    /// Memory of the views through portals.
+    /// Buffer of [`turned::views`].
     turned: Vec<Option<View>>,
     warned_not_finite: bool,
     eye: Eye,
 }
 
 impl Scene {
-    /// Forgets what was added (`ClearScene`).
+    /// Drops the added content (`ClearScene`).
     pub fn clear(&mut self) {
         self.entities.clear();
         self.polys.clear();
@@ -365,12 +363,12 @@ impl Scene {
         self.lights.clear();
     }
 
-    /// Whose views follow.
+    /// Sets the eye of the following views.
     pub fn set_eye(&mut self, eye: Eye) {
         self.eye = eye;
     }
 
-    /// Adds an entity. One whose place is not a number is left out, with one warning.
+    /// Adds an entity. Omits one with a non-finite position, with one warning.
     pub fn add_entity(&mut self, entity: &RefEntity) {
         if !entity.origin.is_finite() {
             if !std::mem::replace(&mut self.warned_not_finite, true) {
@@ -381,7 +379,7 @@ impl Scene {
         self.entities.push(*entity);
     }
 
-    /// Adds polygons of `vertices_per_poly` corners each. Handle 0 is refused with a warning.
+    /// Adds polygons of `vertices_per_poly` corners each. Refuses handle 0 with a warning.
     pub fn add_poly(&mut self, shader: i32, vertices: &[PolyVert], vertices_per_poly: usize) {
         let Ok(material) = u32::try_from(shader) else {
             return;
@@ -406,15 +404,15 @@ impl Scene {
         }
     }
 
-    /// Adds a dynamic light; one without reach is nothing.
+    /// Adds a dynamic light, unless its radius is 0.
     pub fn add_light(&mut self, light: DynamicLight) {
         if light.radius > 0.0 && light.origin.is_finite() && light.color.is_finite() {
             self.lights.push(light);
         }
     }
 
-    /// Turns what was added into views of the classic look and forgets it: at most one view through a portal or mirror,
-    /// then the view that was asked for. Hand the views back with [`recycle_classic`](Self::recycle_classic).
+    /// Turns the added content into views of the classic look: at most one through a portal or mirror, then the main
+    /// view. Return the views through [`recycle_classic`](Self::recycle_classic).
     ///
     /// # Errors
     /// [`Error::EntityKind`] for an entity of a kind that is never drawn.
@@ -426,7 +424,7 @@ impl Scene {
         self.gather(input, |scene| gather::classic_views(scene, input, def))
     }
 
-    /// Turns what was added into a view of the traced look and forgets it. Hand the view back with
+    /// Turns the added content into a view of the traced look. Return the view through
     /// [`recycle_traced`](Self::recycle_traced).
     ///
     /// # Errors
@@ -456,18 +454,18 @@ impl Scene {
         Ok(views)
     }
 
-    /// Takes back views that are drawn, so that the next ones need no new memory.
+    /// Takes back drawn views, so that later ones reuse their buffers.
     pub fn recycle_classic(&mut self, mut views: Vec<ClassicScene>) {
         self.classic_pool.append(&mut views);
         self.lists.push(views);
     }
 
-    /// Takes back a view that is drawn, so that the next one needs no new memory.
+    /// Takes back a drawn view, so that a later one reuses its buffers.
     pub fn recycle_traced(&mut self, view: TracedScene) {
         self.traced_pool.push(view);
     }
 
-    /// The frame is over: what was added and never drawn is forgotten.
+    /// Ends the frame: drops content that was added and not drawn.
     pub fn end_frame(&mut self) {
         self.clear();
     }

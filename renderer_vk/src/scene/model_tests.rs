@@ -213,13 +213,13 @@ fn joints_turn_vertices_and_normals() {
         assert!(vertex.position.abs_diff_eq(Vec3::Y * 8.0, 1e-3));
         assert!(vertex.normal.abs_diff_eq(Vec3::Y, 1e-3));
         assert_eq!(vertex.color.to_le_bytes(), [10, 20, 30, 40]);
-        // half way there
+        // halfway between the frames
         let view = gather_traced(&game, &at(model, 1, 0, 0.5));
         let eighth = std::f32::consts::FRAC_PI_4;
         let expected = Vec3::new(eighth.cos(), eighth.sin(), 0.0) * 8.0;
         assert!(view.vertices[0].position.abs_diff_eq(expected, 1e-3));
     }
-    // out of sight by its bounds; without any it is always drawn
+    // culled by its bounds; a model without bounds is always drawn
     let behind = |model| RefEntity {
         origin: Vec3::X * -500.0,
         ..at(model, 0, 0, 0.0)
@@ -255,7 +255,7 @@ fn skins_and_shaders_count_for_every_kind() {
         let own = material(&plain, 0).unwrap();
         assert_ne!(own, wall);
         assert_eq!(game.materials.get(own).name, "t/wall");
-        // one shader for each surface, whatever the number
+        // one material for each surface, whatever the number
         let numbered = RefEntity {
             skin_num: 7,
             ..plain
@@ -267,7 +267,7 @@ fn skins_and_shaders_count_for_every_kind() {
         };
         let red = material(&skinned, 0).unwrap();
         assert_eq!(game.materials.get(red).name, "t/red");
-        // a surface that the skin does not name has the default material
+        // a surface that the skin omits has the default material
         if name.ends_with("mdr") {
             assert_eq!(material(&skinned, 1), Some(0));
         }
@@ -325,7 +325,7 @@ fn other_kinds_of_model_are_tried_under_the_name() {
     assert_eq!(kind("m/both"), Some("iqm"), "the first of its kinds");
     assert_eq!(kind("m/both.md3"), Some("iqm"));
     assert_eq!(kind("m/both.mdr"), Some("mdr"));
-    // an extension that no reader has is a part of the name
+    // an extension without a reader is a part of the name
     assert_eq!(kind("m/odd.name"), Some("iqm"));
     assert_eq!(kind("m/both.xyz"), None);
     assert_eq!(kind("m/none.mdr"), None);

@@ -1,4 +1,4 @@
-//! Models with key frames or skeletons: which frames, which level of detail, which material, and their vertices.
+//! Models with key frames or skeletons: frames, level of detail, materials, vertices.
 //!
 //! Source: engine behaviour of `renderer_opengl1` (model surfaces).
 
@@ -20,38 +20,38 @@ use crate::api::{RefEntity, renderfx};
 use crate::assets::{IqmModel, Md3Lod, MdrModel, Model};
 use crate::settings::ModelShadows;
 
-/// Box of a skeleton without bounds of its own where fog is looked up, units.
+/// Box for the fog of a skeletal model without bounds, units.
 const UNKNOWN: Aabb = Aabb::new(Vec3::splat(-8.0), Vec3::splat(8.0));
 
-/// A model placed in a view, ready for its surfaces.
+/// A model placed in a view.
 pub(super) struct Placed<'a> {
-    /// The engine's number of the entity.
+    /// Number of the entity in the engine.
     number: u32,
     entity: &'a RefEntity,
-    /// Seen in mirrors and portals only, and this is neither.
+    /// Visible in mirrors and portals only, in a view that is neither.
     hidden: bool,
-    /// Material of the planar shadow that it casts.
+    /// Material of its planar shadow.
     shadow: Option<u32>,
     instance: u32,
-    /// Fog volume plus one; 0 none.
+    /// Fog volume plus one; 0: no fog.
     fog: u32,
 }
 
-/// A key frame that a model stands still in.
+/// The single key frame that a model is drawn in.
 #[derive(Clone, Copy)]
 struct StillFrame {
     frame: usize,
-    /// The model has no other.
+    /// The model has no other frame.
     only: bool,
 }
 
-/// What a surface of a model is made from.
+/// Source of a model's surface.
 struct SurfaceSource<'a> {
     id: MeshId,
     name: &'a str,
-    /// The materials that the model itself has for it.
+    /// The model's own materials for the surface.
     materials: &'a [u32],
-    /// It stands still.
+    /// The frame, if the model is not between two.
     still: Option<StillFrame>,
 }
 
@@ -118,7 +118,7 @@ impl Gatherer<'_> {
         let Some(lod) = lods.get(level) else {
             return;
         };
-        // a coarser level may have fewer frames
+        // coarser levels may have fewer frames
         let frames = if lod.md3.frames.len() > frames.new.max(frames.old) {
             frames
         } else {
@@ -201,7 +201,7 @@ impl Gatherer<'_> {
         self.scratch.bones = pose;
     }
 
-    /// The level of detail of a model, by the size of its frame in the finest one.
+    /// Level of detail of a model, by the projected size of its frame in the finest level.
     fn level(
         &self,
         placed: &Placed<'_>,
@@ -216,7 +216,7 @@ impl Gatherer<'_> {
         ))
     }
 
-    /// The newer of the frames that a model is drawn between, of those of its level of detail; `None` out of sight.
+    /// The newer of the model's two frames in its level of detail; `None` if culled.
     fn frame_in_sight<'m>(
         &self,
         placed: &Placed<'_>,
@@ -229,8 +229,8 @@ impl Gatherer<'_> {
         (!lies.is_outside()).then_some(new)
     }
 
-    /// Lights a model and finds the fog that it is in, by the sphere around it: `middle` is in the model's space but
-    /// is not turned with it, as in the engine.
+    /// Lights a model, and finds its fog by its bounding sphere: `middle` is in model space, but not rotated, as in the
+    /// engine.
     fn place<'e>(
         &self,
         placed: Placed<'e>,
@@ -248,7 +248,7 @@ impl Gatherer<'_> {
         }
     }
 
-    /// Adds a surface, and its shadow. `append` puts its vertices and triangles at the end of the view's.
+    /// Adds a surface and its shadow. `append` appends its vertices and triangles to the view.
     fn add_surface(
         &mut self,
         placed: &Placed<'_>,
@@ -291,8 +291,8 @@ impl Gatherer<'_> {
         }
     }
 
-    /// Adds a surface whose vertices need not be made anew; `false` for one that moves, or that the classic look draws,
-    /// which copies all vertices of a view together.
+    /// Adds a surface as a shared rigid mesh. `false` if it moves, and in the classic look, which uploads all vertices
+    /// of a view together.
     fn add_rigid(
         &mut self,
         source: &SurfaceSource<'_>,
@@ -346,8 +346,7 @@ impl Gatherer<'_> {
         true
     }
 
-    /// The material that an entity casts a planar shadow with, if it casts one (`cg_shadows 3`). Traced views have
-    /// real ones.
+    /// The material of an entity's planar shadow (`cg_shadows 3`), if it casts one. Traced views have traced shadows.
     fn shadow_material(&self, entity: &RefEntity) -> Option<u32> {
         let casts = !self.traced
             && self.input.settings.shadows == ModelShadows::Planar
@@ -362,7 +361,7 @@ impl Gatherer<'_> {
             && entity.renderfx & (renderfx::NO_SHADOW | renderfx::DEPTH_HACK) == 0
     }
 
-    /// The material of a model's surface: the entity's own, its skin's, or the model's.
+    /// The material of a model's surface: that of the entity, of its skin, or of the model.
     fn surface_material(&self, entity: &RefEntity, name: &str, own: &[u32]) -> u32 {
         let materials = self.input.materials;
         if entity.custom_shader != 0 {

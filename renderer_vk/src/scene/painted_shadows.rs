@@ -1,20 +1,20 @@
-//! Shadows that a game paints itself: with `cg_shadows 1` a dark mark on the ground below each player, made anew in every
-//! frame. Where shadows are traced it would be a second one.
+//! Recognizes the shadows that a game draws itself: with `cg_shadows 1`, a dark mark on the ground below each player in
+//! every frame. The traced look omits them, because it traces these shadows.
 //!
-//! Source: behaviour of the game (cgame): the middle of a mark's picture is the point that it was made for, which for
-//! these is straight below the place of the model that casts them; other marks stay where something was hit.
+//! Source: behaviour of the game (cgame): the centre of a mark's texture is the projected position. For shadows it lies
+//! straight below the origin of a model; other marks stay where something hit a surface.
 
 use glam::{Vec2, Vec3};
 use shaderscript::{BlendFactor, Shader};
 
 use crate::api::{EntityKind, PolyVert, RefEntity};
 
-/// How far the middle may be from the line below a model, units: what rounding makes of it.
+/// Tolerance of the centre's distance from the vertical line through the model, units, for rounding.
 const SLACK: f32 = 0.1;
-/// How far below a model the game paints its shadow, units.
+/// Distance below a model within which the game draws its shadow, units.
 const REACH: f32 = 160.0;
 
-/// Whether a material takes light away and gives none.
+/// Whether a material can only darken what is behind it.
 pub fn only_darkens(shader: &Shader) -> bool {
     let takes = |stage: &shaderscript::Stage| {
         matches!(
@@ -28,12 +28,12 @@ pub fn only_darkens(shader: &Shader) -> bool {
     !shader.stages.is_empty() && shader.stages.iter().all(takes)
 }
 
-/// Where on its plane a polygon's picture has its middle; `None` where the picture is not stretched over a plane.
+/// Centre of a polygon's texture on its plane; `None` if the texture coordinates do not span the plane.
 fn middle(corners: &[PolyVert]) -> Option<Vec3> {
     let [a, rest @ ..] = corners else {
         return None;
     };
-    // the largest triangle of the fan has the best digits
+    // the largest triangle of the fan has the least rounding error
     let area = |b: &PolyVert, c: &PolyVert| (b.st - a.st).perp_dot(c.st - a.st);
     let (b, c) = rest
         .windows(2)
@@ -52,7 +52,7 @@ fn middle(corners: &[PolyVert]) -> Option<Vec3> {
     Some(a.position + (b.position - a.position) * along_b + (c.position - a.position) * along_c)
 }
 
-/// Whether a polygon of a darkening material is the shadow that the game paints below one of the models.
+/// Whether a polygon with a darkening material is the shadow of one of the models.
 pub fn is_painted_shadow(corners: &[PolyVert], entities: &[RefEntity]) -> bool {
     let Some(middle) = middle(corners) else {
         return false;
@@ -69,7 +69,7 @@ pub fn is_painted_shadow(corners: &[PolyVert], entities: &[RefEntity]) -> bool {
 mod tests {
     use super::*;
 
-    /// A piece of a mark of 24 units around `center`, cut off at one side.
+    /// A part of a mark with a radius of 24 units around `center`, clipped at one side.
     fn piece(center: Vec3) -> Vec<PolyVert> {
         let corner = |x: f32, y: f32| PolyVert {
             position: center + Vec3::new(x, y, 0.0),

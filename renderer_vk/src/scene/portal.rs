@@ -1,4 +1,4 @@
-//! Portals and mirrors: which surface shows another view, and which view that is.
+//! Portals and mirrors: the surfaces that show another view, and those views.
 //!
 //! Source: engine behaviour of `renderer_opengl1` (portal views).
 
@@ -13,10 +13,10 @@ use crate::api::{EntityKind, RefDef, RefEntity, rdflags};
 use crate::assets::Model;
 use crate::world::WorldData;
 
-/// Farthest that the entity may be from the plane that it marks, units.
+/// Largest distance between a portal's plane and the entity that marks it, units.
 const REACH: f32 = 64.0;
 
-/// The first surface in drawing order that shows a portal or mirror in sight; never within one.
+/// The first visible surface in drawing order that shows a portal or mirror; `None` inside such a view.
 pub(super) fn find_first(
     entities: &[RefEntity],
     input: &GatherInput<'_>,
@@ -45,7 +45,7 @@ pub(super) fn find_first(
         })
 }
 
-/// Every portal and mirror that the view may meet, each plane once.
+/// All portals and mirrors that rays may hit, one for each plane.
 pub(super) fn find_all(
     entities: &[RefEntity],
     input: &GatherInput<'_>,
@@ -88,7 +88,7 @@ pub(super) fn find_all(
     found
 }
 
-/// Where a model of the map is: 0 is the map itself. `None`: no entity places it.
+/// The instance of a BSP model; 0 is the world. `None`: no entity places it.
 fn placed_model(model: u32, entities: &[RefEntity], input: &GatherInput<'_>) -> Option<Instance> {
     let identity = Instance {
         axis: [Vec3::X, Vec3::Y, Vec3::Z],
@@ -116,8 +116,8 @@ fn placed_model(model: u32, entities: &[RefEntity], input: &GatherInput<'_>) -> 
         })
 }
 
-/// The plane that the map stores for a surface of the view. Which way is up in a portal depends on the least of its
-/// normal's components, so that of triangles does not do: they may be deformed, and their zeros are not exact.
+/// The plane that the map stores for a surface of the view. The up direction in a portal depends on the smallest
+/// component of the normal; triangles may be deformed, and their normals have rounding errors.
 fn stored_plane(world: &WorldData, scene: &ClassicScene, surface: &DrawSurface) -> Option<Plane> {
     let instance = slice::get(&scene.instances, surface.instance as usize)?;
     let mut portals = world
@@ -137,7 +137,7 @@ fn stored_plane(world: &WorldData, scene: &ClassicScene, surface: &DrawSurface) 
     found.plane.map(|plane| placed_plane(plane, instance))
 }
 
-/// A plane of a model's space in the world.
+/// A plane in the space of an instance, transformed to world space.
 fn placed_plane(plane: Plane, instance: &Instance) -> Plane {
     let [x, y, z] = instance.axis;
     let normal = x * plane.normal.x + y * plane.normal.y + z * plane.normal.z;
@@ -147,7 +147,7 @@ fn placed_plane(plane: Plane, instance: &Instance) -> Plane {
     }
 }
 
-/// World-space triangles of a surface of the view.
+/// World-space triangles of a surface.
 fn triangles(world: &WorldData, scene: &ClassicScene, surface: &DrawSurface) -> Vec<[Vec3; 3]> {
     let Some(instance): Option<&Instance> = slice::get(&scene.instances, surface.instance as usize)
     else {
@@ -181,7 +181,7 @@ fn triangles(world: &WorldData, scene: &ClassicScene, surface: &DrawSurface) -> 
     }
 }
 
-/// Plane of a triangle that is clockwise seen from its front.
+/// Plane of a triangle, whose front winds clockwise.
 fn plane_of(triangle: &[Vec3; 3]) -> Option<Plane> {
     let [a, b, c] = *triangle;
     let normal = (c - a).cross(b - a).try_normalize()?;
@@ -191,7 +191,7 @@ fn plane_of(triangle: &[Vec3; 3]) -> Option<Plane> {
     })
 }
 
-/// The portal or mirror that an entity makes of a plane; `None` when no entity marks it.
+/// The portal or mirror on a plane; `None` if no entity marks it.
 fn portal_at(plane: Plane, entities: &[RefEntity], def: &RefDef) -> Option<Portal> {
     let entity = entities.iter().find(|e| {
         e.kind == EntityKind::PortalSurface
@@ -221,7 +221,7 @@ fn portal_at(plane: Plane, entities: &[RefEntity], def: &RefDef) -> Option<Porta
     })
 }
 
-/// Axes of a portal's far camera: the entity's, turned round, rolled as its numbers say.
+/// Axes of a portal's far camera: those of its entity, turned by half a turn and rolled by its parameters.
 fn camera_axes(entity: &RefEntity, def: &RefDef) -> [Vec3; 3] {
     let [forward, left, up] = entity.axis;
     let forward = -forward;
@@ -246,7 +246,7 @@ fn camera_axes(entity: &RefEntity, def: &RefDef) -> [Vec3; 3] {
     [forward, left, forward.cross(left)]
 }
 
-/// Whether some triangle is turned to the camera and in the view; with `reach`, also near enough.
+/// Whether a triangle faces the camera and lies in the frustum; with `reach`, also near enough.
 fn in_sight(triangles: &[[Vec3; 3]], view: &View, reach: Option<f32>) -> bool {
     let frustum = view.frustum();
     let corners = || triangles.iter().flatten();
@@ -262,7 +262,7 @@ fn in_sight(triangles: &[[Vec3; 3]], view: &View, reach: Option<f32>) -> bool {
     !out && faces && reach.is_none_or(|reach| nearest <= reach * reach)
 }
 
-/// What is seen through a portal or mirror from a view.
+/// The view that a portal or mirror shows.
 pub(super) fn view_through(portal: &Portal, from: &View) -> View {
     let turn = |v: Vec3| {
         let [a, b, c] = portal.surface_axis.map(|axis| v.dot(axis));
@@ -323,7 +323,7 @@ mod tests {
         assert!(seen.axis[0].abs_diff_eq(-Vec3::X, 1e-6));
         assert!(seen.axis[1].abs_diff_eq(Vec3::Y, 1e-6));
         assert!(seen.mirrored && seen.is_portal);
-        // what is before the mirror shows, what is behind it does not
+        // the view shows the front of the mirror's plane only
         let clip = seen.clip_plane.unwrap();
         assert!(clip.truncate().dot(Vec3::ZERO) > clip.w);
         assert!(clip.truncate().dot(Vec3::X * 150.0) < clip.w);

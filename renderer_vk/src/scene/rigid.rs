@@ -1,4 +1,4 @@
-//! Surfaces of models in one key frame: what looks the same in every frame is evaluated once and shared.
+//! Shares the vertices of models that rest in one key frame.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use shaders::types::Vertex;
 
-/// Views after which a mesh that was not drawn is forgotten.
+/// Number of views after which an undrawn mesh is dropped.
 const KEPT: u64 = 1000;
 
-/// A surface of a model.
+/// Identifies a surface of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct MeshId {
     /// Handle of the model.
@@ -20,10 +20,10 @@ pub struct MeshId {
     pub surface: u32,
 }
 
-/// A surface that keeps its shape, in the space of its instance.
+/// A surface of constant shape, in the space of its instance.
 #[derive(Debug)]
 pub struct RigidMesh {
-    /// No other mesh has it.
+    /// Unique id.
     pub id: u64,
     /// Vertices.
     pub vertices: Vec<Vertex>,
@@ -32,7 +32,7 @@ pub struct RigidMesh {
 }
 
 impl RigidMesh {
-    /// A mesh of its own.
+    /// A mesh with a new id.
     pub fn new(vertices: Vec<Vertex>, indices: Vec<u32>) -> Self {
         static NEXT: AtomicU64 = AtomicU64::new(1);
         Self {
@@ -43,20 +43,19 @@ impl RigidMesh {
     }
 }
 
-/// How much of a mesh is the same from frame to frame.
+/// Part of a mesh that stays the same from frame to frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Shape {
     /// Nothing: polygons, sprites, beams.
     #[default]
     Changing,
-    /// Its triangles; the vertices are somewhere else: key frames between which it is drawn, bones.
+    /// The triangles; vertices move by key frames, bones or deformations.
     Animated(MeshId),
-    /// Everything: this index of [`TracedPart::rigid`](super::look::TracedPart::rigid), which has its vertices and
-    /// indices; the mesh's own ranges are empty.
+    /// Everything: the index in [`TracedPart::rigid`](super::look::TracedPart::rigid); the mesh's own ranges are empty.
     Rigid(u32),
 }
 
-/// The meshes that keep their shape, by what they show.
+/// Rigid meshes by surface and key frame.
 #[derive(Debug, Default)]
 pub(super) struct RigidMeshes {
     entries: HashMap<(MeshId, usize), Entry>,
@@ -65,13 +64,13 @@ pub(super) struct RigidMeshes {
 
 #[derive(Debug)]
 struct Entry {
-    /// Number of the view that it was last asked for in.
+    /// Number of the last view that requested it.
     seen: u64,
     mesh: Option<Arc<RigidMesh>>,
 }
 
 impl RigidMeshes {
-    /// Another view begins.
+    /// Begins a view.
     pub fn begin_view(&mut self) {
         self.view += 1;
         if self.view.is_multiple_of(KEPT) {
@@ -80,8 +79,8 @@ impl RigidMeshes {
         }
     }
 
-    /// The mesh of a surface in a key frame. `only`: the model has no other frame; otherwise the frame has to rest for
-    /// two views to be one that is kept, so that nothing is kept of an animation whose frames pass by.
+    /// The mesh of a surface in a key frame. `only`: the model has no other frame. Otherwise the mesh is made when two
+    /// successive views have requested it, so that no frame of a running animation is stored.
     pub fn get(
         &mut self,
         id: MeshId,
@@ -96,7 +95,7 @@ impl RigidMeshes {
         });
         let rests = only || (entry.seen > 0 && view - entry.seen <= 1);
         if entry.seen != view {
-            // asked for twice in one view it has not rested longer
+            // a second request in the same view does not count
             if rests && entry.mesh.is_none() {
                 let (vertices, indices) = make();
                 entry.mesh = Some(Arc::new(RigidMesh::new(vertices, indices)));

@@ -1,14 +1,14 @@
-//! Shadow volumes of models (`cg_shadows 2`): the outline of a mesh as its light sees it, drawn out away from the light.
+//! Shadow volumes of models (`cg_shadows 2`): the silhouette of a mesh from its light, extruded away from the light.
 //!
-//! Source: engine behaviour of `renderer_opengl1` (stencil shadows). Where the camera looks into a volume more often than
-//! out of it, there is shadow. The volumes have no ends; they stop far below any floor that would show them.
+//! Source: engine behaviour of `renderer_opengl1` (stencil shadows). A pixel is in shadow if its view ray enters
+//! volumes more often than it leaves them. The volumes have no caps; they end far below any visible floor.
 
 use glam::Vec3;
 use shaders::types::{Instance, Vertex};
 
 use super::entity::to_world;
 
-/// How far volumes reach, in the units of their model.
+/// Length of the extrusion, model units.
 const REACH: f32 = 512.0;
 
 /// The shadow volumes of a view, world space.
@@ -16,19 +16,18 @@ const REACH: f32 = 512.0;
 pub struct ShadowVolumes {
     /// Corners.
     pub positions: Vec<Vec3>,
-    /// Three for each triangle. A side that faces the camera winds counter-clockwise on the screen (in a mirror,
-    /// clockwise).
+    /// Indices, three a triangle. Front faces wind counter-clockwise on the screen, in a mirror clockwise.
     pub indices: Vec<u32>,
-    /// First index and number of indices of each entity's volumes: an entity counts up before it counts down.
+    /// First index and number of indices for each entity: its stencil increments precede its decrements.
     pub ranges: Vec<(u32, u32)>,
-    /// The instance that the last range belongs to.
+    /// Instance of the last range.
     newest: Option<u32>,
-    /// Edges of triangles that turn away from the light, reused.
+    /// Buffer: edges of the triangles that face away from the light.
     edges: Vec<(u32, u32)>,
 }
 
 impl ShadowVolumes {
-    /// Empties the list.
+    /// Empties the lists.
     pub fn clear(&mut self) {
         self.positions.clear();
         self.indices.clear();
@@ -36,8 +35,7 @@ impl ShadowVolumes {
         self.newest = None;
     }
 
-    /// Adds the volumes of one surface of instance `number`: `indices` count from `base`, the number of the first of
-    /// `vertices`.
+    /// Adds the volumes of a surface of instance `number`. `base`: number of the first of `vertices` in `indices`.
     pub(super) fn add(
         &mut self,
         number: u32,
@@ -64,7 +62,7 @@ impl ShadowVolumes {
         }
         self.edges.sort_unstable();
         for &(a, b) in &self.edges {
-            // an edge that such a triangle has on either side is no outline
+            // an edge between two such triangles is no silhouette
             if self.edges.binary_search(&(b, a)).is_ok() {
                 continue;
             }
@@ -104,7 +102,7 @@ mod tests {
         }
     }
 
-    /// A unit cube whose corners bits 0, 1, 2 of their number place; faces wind clockwise seen from outside.
+    /// A unit cube: bits 0 to 2 of a corner's number are its coordinates; faces wind clockwise seen from outside.
     fn cube() -> (Vec<Vertex>, Vec<u32>) {
         let vertices = (0..8u8)
             .map(|i| {
@@ -146,17 +144,17 @@ mod tests {
         assert_eq!(volumes.positions.len(), 16);
         let depths: Vec<f32> = volumes.positions.iter().map(|p| p.z).collect();
         assert!(depths.iter().all(|z| *z == 0.0 || *z == -REACH));
-        // every side faces outwards when it winds counter-clockwise
+        // every side faces outwards with counter-clockwise winding
         let middle = Vec3::new(100.5, 0.5, -REACH * 0.5);
         for &[a, b, c] in volumes.indices.as_chunks::<3>().0 {
             let [a, b, c] = [a, b, c].map(|i| volumes.positions[i as usize]);
             assert!((b - a).cross(c - a).dot(a - middle) > 0.0);
         }
-        // another surface of the same entity joins, another entity does not
+        // another surface of the same entity extends its range, another entity begins one
         volumes.add(1, &lit_from(Vec3::Z), &vertices, &indices, 10);
         volumes.add(2, &lit_from(Vec3::Z), &vertices, &indices, 10);
         assert_eq!(volumes.ranges, [(0, 48), (48, 24)]);
-        // seen from a corner it has six
+        // from a corner, the silhouette has six edges
         volumes.clear();
         volumes.add(1, &lit_from(Vec3::ONE.normalize()), &vertices, &indices, 10);
         assert_eq!(volumes.positions.len(), 24);
@@ -167,7 +165,7 @@ mod tests {
         let (vertices, indices) = cube();
         let mut volumes = ShadowVolumes::default();
         volumes.add(1, &lit_from(Vec3::ZERO), &vertices, &indices, 10);
-        // indices that are none
+        // indices out of range
         volumes.add(1, &lit_from(Vec3::Z), &vertices, &[0, 1, 99], 10);
         assert!(volumes.ranges.is_empty());
     }

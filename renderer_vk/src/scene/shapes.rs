@@ -1,6 +1,6 @@
-//! Entities that are shapes: sprites, beams, rails, lightning. All in world space.
+//! Entities that are built on the CPU in world space: sprites, beams, rails, lightning.
 //!
-//! Source: engine behaviour of `renderer_opengl1` (entity surfaces), with its quirks: a beam begins at the world's
+//! Source: engine behaviour of `renderer_opengl1` (entity surfaces), quirks included: a beam begins at the world's
 //! origin, the first corner of a rail's core is dim.
 
 use glam::{Quat, Vec2, Vec3};
@@ -14,23 +14,22 @@ use crate::settings::Settings;
 const LIGHTNING_WIDTH: f32 = 8.0;
 /// Quads of a lightning bolt.
 const LIGHTNING_QUADS: usize = 4;
-/// Sides and radius of a beam.
+/// Number of sides of a beam, and its radius, units.
 const BEAM_SIDES: u32 = 6;
 const BEAM_RADIUS: f32 = 4.0;
-/// Units of a rail's core for one width of its texture.
+/// Length of a rail's core for one repetition of its texture, units.
 const RAIL_TEXTURE_LENGTH: f32 = 256.0;
-/// Length of a rail trail after which no more rings are drawn, units: twice the largest map, so that only a broken
-/// entity gets there.
+/// Length of a rail trail at which rings end, units: twice the largest map, so that only invalid entities reach it.
 const MAX_RAIL_LENGTH: f32 = 262_144.0;
-/// Length of the axes that stand for a missing model, units, and half their width, pixels.
+/// Length of the axes drawn for a missing model, units, and half their width, pixels.
 const AXIS_LENGTH: f32 = 16.0;
 const AXIS_HALF_WIDTH: f32 = 1.5;
 
-/// Vertices and local indices of a mesh under construction.
+/// Appends geometry to a view.
 pub(super) struct MeshBuilder<'a> {
-    /// All vertices of the view.
+    /// The view's vertices.
     pub vertices: &'a mut Vec<Vertex>,
-    /// All indices of the view; they count from the start of `vertices`.
+    /// The view's indices; they count from the start of `vertices`.
     pub indices: &'a mut Vec<u32>,
 }
 
@@ -44,7 +43,7 @@ impl MeshBuilder<'_> {
             position,
             normal,
             st,
-            // the engine's quads have both coordinates alike
+            // the engine's quads have equal texture and lightmap coordinates
             lightmap: st,
             color,
         });
@@ -54,7 +53,7 @@ impl MeshBuilder<'_> {
         u32::try_from(self.vertices.len()).unwrap_or(u32::MAX)
     }
 
-    /// A quad that faces the camera, turned by the entity's rotation.
+    /// A quad that faces the camera, rotated by the entity.
     pub fn sprite(&mut self, entity: &RefEntity, view: &View) {
         let [forward, axis_left, axis_up] = view.axis;
         let radius = entity.radius;
@@ -73,7 +72,7 @@ impl MeshBuilder<'_> {
         );
     }
 
-    /// A quad of corners in order around it.
+    /// A quad, by its corners in winding order.
     fn quad(&mut self, corners: [Vec3; 4], normal: Vec3, st: [Vec2; 4], color: u32) {
         let base = self.next();
         for (corner, st) in corners.into_iter().zip(st) {
@@ -82,7 +81,7 @@ impl MeshBuilder<'_> {
         self.indices.extend([0, 1, 3, 3, 1, 2].map(|i| base + i));
     }
 
-    /// A red tube. Its points are not moved to the entity's place: the engine's bug, kept.
+    /// A red tube. The engine does not translate it to the entity's position (a bug that this keeps).
     pub fn beam(&mut self, entity: &RefEntity) {
         let along = entity.old_origin - entity.origin;
         let Some(direction) = along.try_normalize() else {
@@ -104,7 +103,7 @@ impl MeshBuilder<'_> {
         }
     }
 
-    /// The core of a rail trail: from `old_origin` to `origin`.
+    /// The core of a rail trail, from `old_origin` to `origin`.
     pub fn rail_core(&mut self, entity: &RefEntity, view: &View, settings: &Settings) {
         let (start, end) = (entity.old_origin, entity.origin);
         let side = side_of_line(start, end, view.origin);
@@ -129,7 +128,7 @@ impl MeshBuilder<'_> {
     }
 
     fn core(&mut self, start: Vec3, end: Vec3, side: Vec3, width: f32, rgba: [u8; 4]) {
-        // the engine leaves alpha as it was in its buffer; opaque is what that mostly is
+        // the engine leaves alpha undefined; it is mostly opaque
         let [r, g, b, _] = rgba;
         let color = packed([r, g, b, 255]);
         let dim = packed([r / 4, g / 4, b / 4, 255]);
@@ -143,12 +142,12 @@ impl MeshBuilder<'_> {
         self.indices.extend([0, 1, 2, 2, 1, 3].map(|i| base + i));
     }
 
-    /// Rings around a rail trail: from `old_origin` to `origin`.
+    /// Rings around a rail trail, from `old_origin` to `origin`.
     pub fn rail_rings(&mut self, entity: &RefEntity, settings: &Settings) {
         let (start, end) = (entity.old_origin, entity.origin);
         let length = (end - start).length().min(MAX_RAIL_LENGTH);
         let direction = (end - start).normalize_or_zero();
-        // rings closer than a unit are a line; the engine would divide by zero
+        // the engine would divide by zero
         let spacing = settings.rail_segment_length.max(1.0);
         let step = direction * spacing;
         let mut count = ((length / spacing) as u32).max(1);
@@ -172,7 +171,7 @@ impl MeshBuilder<'_> {
         }
     }
 
-    /// Red, green and blue axes of an entity: lines of so many pixels wherever they are.
+    /// Red, green and blue axes of an entity, as lines of constant width in pixels.
     pub fn axes(&mut self, entity: &RefEntity, view: &View) {
         let colors = [[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255]];
         for (axis, color) in entity.axis.into_iter().zip(colors) {
@@ -181,12 +180,12 @@ impl MeshBuilder<'_> {
         }
     }
 
-    /// A line as OpenGL draws one that is some pixels wide: as wide in columns, if it is steeper than a diagonal, else
-    /// in rows.
+    /// A line of a width in pixels, as OpenGL draws it: a steep line has that width horizontally,
+    /// another line vertically.
     fn pixel_line(&mut self, from: Vec3, to: Vec3, color: u32, view: &View) {
         let [forward, left, up] = view.axis;
         let [from_depth, to_depth] = [from, to].map(|p| forward.dot(p - view.origin));
-        // what lies before the near plane has no width
+        // clips the line at the near plane
         let near = view.near;
         let (from, to) = match (from_depth < near, to_depth < near) {
             (false, false) => (from, to),
@@ -201,7 +200,7 @@ impl MeshBuilder<'_> {
             }
         };
         let [_, _, width, height] = view.viewport.map(|side| side.max(1) as f32);
-        // units that a pixel is at a distance of 1
+        // size of a pixel at distance 1, units
         let (across, down) = (2.0 * view.tan_x / width, 2.0 * view.tan_y / height);
         let pixels = |p: Vec3| {
             let seen = p - view.origin;
@@ -225,21 +224,21 @@ impl MeshBuilder<'_> {
     }
 }
 
-/// Unit vector across a line as the camera sees it; zero when the camera is on the line.
+/// Unit vector perpendicular to a line and to the view direction; zero if the camera is on the line.
 fn side_of_line(start: Vec3, end: Vec3, camera: Vec3) -> Vec3 {
     let to_start = (start - camera).normalize_or_zero();
     let to_end = (end - camera).normalize_or_zero();
     to_start.cross(to_end).normalize_or_zero()
 }
 
-/// Two unit vectors across a direction, the engine's choice.
+/// Two unit vectors perpendicular to a direction, as the engine chooses them.
 fn normal_vectors(forward: Vec3) -> (Vec3, Vec3) {
     let turned = Vec3::new(forward.z, -forward.x, forward.y);
     let right = (turned - turned.dot(forward) * forward).normalize_or_zero();
     (right, right.cross(forward))
 }
 
-/// A unit vector perpendicular to a unit vector: its smallest component's axis, projected.
+/// A unit vector perpendicular to a unit vector: the axis of its smallest component, projected.
 pub(crate) fn perpendicular(direction: Vec3) -> Vec3 {
     let size = direction.abs();
     let axis = if size.x <= size.y && size.x <= size.z {
@@ -287,7 +286,7 @@ mod tests {
             assert_eq!(v.color, 0x0403_0201);
         }
         assert_eq!(indices.len(), 6);
-        // a quarter turn carries the left upper corner to the left lower one's place
+        // a quarter turn moves the upper left corner to the lower left
         let turned = RefEntity {
             rotation: 90.0,
             ..entity
@@ -371,7 +370,7 @@ mod tests {
         for found in width(steep) {
             assert!(found.abs_diff_eq(Vec2::new(3.0, 0.0), 1e-3), "{found}");
         }
-        // cut off at the near plane, whichever end is behind it
+        // clipped at the near plane, whichever end is behind it
         for (from, to) in [(start, -start), (-start, start)] {
             let (vertices, _) = build(|m| m.pixel_line(from, to, 1, &view));
             let nearest = vertices.iter().map(|v| v.position.x).fold(1e9, f32::min);

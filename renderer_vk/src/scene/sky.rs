@@ -1,21 +1,22 @@
-//! What of a sky is in sight: the cells of the box around the camera that its surfaces cover.
+//! Coverage of a sky: the cells of the box around the camera that its surfaces cover.
 //!
-//! Source: engine behaviour of `renderer_opengl1`: surfaces of a sky are projected onto the faces of a cube; each face
-//! shows the rectangle of its 8 x 8 cells that they span.
+//! Source: engine behaviour of `renderer_opengl1`: it projects the surfaces of a sky onto the faces of a cube, and
+//! draws on each face the rectangle of 8 × 8 cells that they span.
 
 use glam::{Vec2, Vec3};
 use support::slice::part;
 
 /// Number of faces, in the order of the box's images: right, back, left, front, up, down.
 pub const FACES: usize = 6;
-/// Cells of a face along each side.
+/// Number of cells along each side of a face.
 pub const CELLS: usize = 8;
-/// Polygons below about this share of a face cover nothing.
+/// Smallest polygon that counts, as a part of its face.
 const SMALLEST_SHARE: f32 = 1e-6;
-/// What lies nearer to the plane of the camera than this covers nothing, units.
+/// Smallest distance in front of the camera's plane that counts, units.
 const NEAREST: f32 = 0.001;
 
-/// The inverse of [`shaderscript::Sky::side_point`]: a direction as `(s, t)` of a face, both times the depth towards it, and that depth.
+/// The inverse of [`shaderscript::Sky::side_point`]: a direction as `(s, t)` of a face, both times the depth towards
+/// it, and that depth.
 fn face_point(face: usize, p: Vec3) -> Vec3 {
     match face {
         0 => Vec3::new(-p.y, p.z, p.x),
@@ -27,7 +28,7 @@ fn face_point(face: usize, p: Vec3) -> Vec3 {
     }
 }
 
-/// A rectangle of cells of a face: columns and rows, the last of each left out.
+/// A rectangle of cells of a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cells {
     /// First column and row.
@@ -45,41 +46,41 @@ impl Cells {
     };
 }
 
-/// What the surfaces of one sky cover.
+/// Coverage of the surfaces of a sky.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SkyCoverage {
-    /// Smallest and largest `(s, t)` on each face; the smallest is the larger one where there is none.
+    /// Smallest and largest `(s, t)` on each face; smallest above largest if nothing is covered.
     extent: [(Vec2, Vec2); FACES],
 }
 
-/// A sky of a view.
+/// A visible sky.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VisibleSky {
-    /// Index of the material (remapping already applied).
+    /// Index of the material, after remapping.
     pub material: u32,
-    /// Index of the fog that its surfaces store; 0: none.
+    /// Fog volume plus one; 0: no fog.
     pub fog: u32,
-    /// Where it shows.
+    /// Covered cells.
     pub coverage: SkyCoverage,
 }
 
 impl SkyCoverage {
-    /// Nothing covered.
+    /// No coverage.
     pub const EMPTY: Self = Self {
         extent: [(Vec2::INFINITY, Vec2::NEG_INFINITY); FACES],
     };
 
-    /// Every cell of every face covered.
+    /// Full coverage.
     #[cfg(test)]
     pub const FULL: Self = Self {
         extent: [(Vec2::NEG_ONE, Vec2::ONE); FACES],
     };
 
-    /// Adds a triangle, as seen from the camera.
+    /// Adds a triangle relative to the camera.
     pub fn add(&mut self, triangle: [Vec3; 3]) {
         for (face, (low, high)) in self.extent.iter_mut().enumerate() {
             let mut polygon = Polygon::new(triangle.map(|p| face_point(face, p)));
-            // within the pyramid of the face: |s| <= depth, |t| <= depth
+            // clips to the pyramid of the face: |s| <= depth, |t| <= depth
             polygon.clip(|p| p.z - p.x);
             polygon.clip(|p| p.z + p.x);
             polygon.clip(|p| p.z - p.y);
@@ -95,7 +96,7 @@ impl SkyCoverage {
         }
     }
 
-    /// The cells of a face that show; `None` when there are none.
+    /// The covered cells of a face; `None` if there are none.
     pub fn cells(&self, face: usize) -> Option<Cells> {
         let (low, high) = self.extent.get(face)?;
         let half = CELLS as f32 / 2.0;
@@ -107,7 +108,7 @@ impl SkyCoverage {
     }
 }
 
-/// Corners of a triangle clipped by a few planes: each adds one at most.
+/// Corners of a clipped triangle: each plane adds at most one.
 struct Polygon {
     points: [Vec3; 8],
     count: usize,
@@ -126,7 +127,7 @@ impl Polygon {
         part(&self.points, ..self.count)
     }
 
-    /// It has no area as seen from the camera: a triangle that touches a face of the cube with a corner or an edge alone.
+    /// Whether its solid angle is zero: the triangle only touches the face with a corner or an edge.
     fn covers_nothing(&self) -> bool {
         let corners = self.corners();
         let next = corners.iter().cycle().skip(1);
@@ -134,12 +135,12 @@ impl Polygon {
         let Some(first) = corners.first() else {
             return true;
         };
-        // the volume between it and the camera, in proportion to its extent
+        // volume of its pyramid to the camera, relative to its extent
         let extent = corners.iter().map(|p| p.length()).fold(0.0, f32::max);
         twice_area.dot(*first).abs() <= SMALLEST_SHARE * extent.powi(3)
     }
 
-    /// Keeps the part where `side` is not negative.
+    /// Clips to the part where `side` is not negative.
     fn clip(&mut self, side: impl Fn(Vec3) -> f32) {
         let old = self.points;
         let corners = part(&old, ..self.count);
@@ -200,7 +201,7 @@ mod tests {
         coverage.add([at(-far, -far), at(far, far), at(-far, far)]);
         assert_eq!(coverage.cells(4), Some(Cells::ALL));
         for face in 0..4 {
-            // 100 up at 400 away is a quarter of the face's half: row 5 of 8
+            // 100 up at distance 400 is a quarter of half the face: row 5 of 8
             let side = coverage.cells(face).unwrap();
             assert_eq!((side.from, side.to), ([0, 5], [8, 8]), "face {face}");
         }
@@ -209,7 +210,7 @@ mod tests {
 
     #[test]
     fn what_touches_a_face_with_an_edge_covers_nothing_of_it() {
-        // two walls of a cube around the camera touch the ceiling with an edge each, whose box is all of the ceiling
+        // two walls of a cube around the camera each touch the ceiling with an edge, whose box is the whole ceiling
         let mut coverage = SkyCoverage::EMPTY;
         for face in [0, 1] {
             let at = |s: f32, t: f32| Sky::side_point(face, s, t) * 256.0;

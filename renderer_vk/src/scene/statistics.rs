@@ -1,4 +1,4 @@
-//! Counts of a view for `r_speeds`: what the engine's own renderer counts, of this one's work.
+//! Counts of a view for `r_speeds`: those of the engine's renderer, for this renderer's work.
 
 use glam::Vec3;
 use q3bsp::SurfaceKind;
@@ -14,25 +14,25 @@ use crate::api::{RefEntity, renderfx};
 use crate::assets::Model;
 use crate::world::WorldData;
 
-/// How what was tested against the view's pyramid lies to it.
+/// Results of tests against the frustum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Lying {
-    /// Wholly within.
+    /// Completely inside.
     pub inside: u32,
-    /// Cut by it.
+    /// Crossing a plane.
     pub clipped: u32,
-    /// Wholly without.
+    /// Completely outside.
     pub outside: u32,
 }
 
-/// Counts of a view or of all views of a frame.
+/// Counts of a view, or of all views of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Statistics {
-    /// Runs of surfaces that are drawn as one.
+    /// Runs of surfaces drawn together.
     pub shaders: u32,
     /// Surfaces drawn.
     pub surfaces: u32,
-    /// Leafs of the map in sight.
+    /// Visible leafs of the map.
     pub leafs: u32,
     /// Vertices of the surfaces.
     pub vertices: u32,
@@ -48,19 +48,19 @@ pub struct Statistics {
     pub cluster: i32,
     /// Surfaces that a dynamic light reaches.
     pub lit_surfaces: u32,
-    /// Surfaces near a dynamic light that it does not reach.
+    /// Surfaces whose box a dynamic light overlaps, but not their plane.
     pub unlit_surfaces: u32,
-    /// Vertices drawn once more for a dynamic light.
+    /// Vertices drawn again for dynamic lights.
     pub lit_vertices: u32,
-    /// Triangles drawn once more for a dynamic light.
+    /// Triangles drawn again for dynamic lights.
     pub lit_triangles: u32,
-    /// Flares in sight, before what covers them is known.
+    /// Flares in the frustum, before the occlusion test.
     pub flares: u32,
     /// Distance of the far plane, units.
     pub far: f32,
 }
 
-/// What was tested of curves or models: spheres, and boxes where these did not decide.
+/// Tests of curves or of models: of spheres, and of boxes where spheres did not decide.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CullCounts {
     /// Spheres.
@@ -102,7 +102,7 @@ impl CullCounts {
 }
 
 impl Statistics {
-    /// Adds another view's counts; where it looks from is kept from the newest.
+    /// Adds the counts of another view; cluster and far plane are those of the other view.
     pub fn add(&mut self, other: &Self) {
         let Self {
             shaders,
@@ -140,7 +140,7 @@ impl Statistics {
 
     fn add_surface(&mut self, surface: &DrawSurface, passes: usize, indices: &[u32]) {
         let triangles = u32::try_from(indices.len() / 3).unwrap_or(u32::MAX);
-        // a surface's vertices lie together
+        // the vertices of a surface are contiguous
         let vertices = match (indices.iter().min(), indices.iter().max()) {
             (Some(first), Some(last)) => last - first + 1,
             _ => 0,
@@ -161,7 +161,7 @@ impl Statistics {
 }
 
 impl Gatherer<'_> {
-    /// Counts a gathered view. Only asked for when somebody looks.
+    /// Counts a gathered view, if `r_speeds` is set.
     pub(super) fn count_view(&self, out: &ClassicScene) -> Statistics {
         let mut counts = Statistics {
             cluster: -1,
@@ -217,7 +217,7 @@ impl Gatherer<'_> {
         }
     }
 
-    /// A curve of the map: by the sphere around its box, then by the box.
+    /// Tests a curve of the map: the sphere around its box, then the box.
     fn curve_lies(&self, bounds: &Aabb) -> ModelLies {
         let half = bounds.size() * 0.5;
         let by_sphere = cull::sphere(bounds.mins + half, half.length(), &self.frustum);
@@ -261,7 +261,7 @@ impl Gatherer<'_> {
             (Some(new), Some(old)) => {
                 cull::corners(&cull::placed(entity, &new.union(old)), &self.frustum)
             }
-            // one that tells no bounds may be anywhere
+            // a model without bounds is never culled
             _ => Lies::Across,
         };
         ModelLies {

@@ -1,4 +1,4 @@
-//! Surfaces of the world and of its brush models: what is in sight, in which order, touched by which dynamic light.
+//! Surfaces of the world and of brush models: culling, order, dynamic lights.
 
 use glam::{Vec3, Vec4};
 use q3bsp::SurfaceKind;
@@ -12,60 +12,60 @@ use crate::api::DynamicLight;
 use crate::assets::Materials;
 use crate::world::{WorldData, WorldSurface, outside};
 
-/// Entity number of the world: after every entity.
+/// Entity number of the world, after those of all entities.
 pub(super) const WORLD_ENTITY: u32 = 0xF_FFFF;
-/// As many dynamic lights as fit the bits of a surface.
+/// Number of dynamic lights: one for each bit of a surface's mask.
 const MAX_LIGHT_BITS: usize = 32;
-/// How far behind a face the camera may be before the face counts as turned away, units.
+/// Distance of the camera behind a flat surface from which the surface is culled, units.
 const BACK_FACE_SLACK: f32 = 8.0;
 
-/// The engine's drawing order in one number: material's place, entity, fog, touched by a light or not.
+/// The engine's drawing order as a number: rank of the material, entity, fog, lit by a dynamic light.
 ///
-/// 24, 20, 19 and 1 bits; larger numbers share the last value, which only loosens the order among them.
+/// 24, 20, 19 and 1 bits; larger values are clamped, so their order among each other is lost.
 pub(super) fn sort_key(rank: u32, entity: u32, fog: u32, lit: bool) -> u64 {
     let field = |value: u32, bits: u32| u64::from(value.min((1 << bits) - 1));
     field(rank, 24) << 40 | field(entity, 20) << 20 | field(fog, 19) << 1 | u64::from(lit)
 }
 
-/// A dynamic light as a model sees it.
+/// A dynamic light relative to a model.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LocalLight {
-    /// Where it is in the model's space.
+    /// Position, model space.
     pub local: Vec3,
-    /// Where it is in the world.
+    /// Position, world space.
     pub world: Vec3,
     /// Reach, units.
     pub radius: f32,
 }
 
-/// Where surfaces are seen from, in the space of their model.
+/// A view in the space of a model.
 pub(super) struct LocalView<'a> {
     /// Camera position, model space.
     pub camera: Vec3,
-    /// Planes pointing inwards; empty when nothing is culled.
+    /// Planes of the frustum, facing inwards; empty without culling.
     pub frustum: &'a [Vec4],
     /// Dynamic lights.
     pub lights: &'a [LocalLight],
     /// Unit view direction.
     pub forward: Vec3,
-    /// Flat surfaces that are turned away are left out (`r_facePlaneCull`).
+    /// Culls flat surfaces by facing (`r_facePlaneCull`).
     pub by_facing: bool,
 }
 
-/// Bits of the lights that reach a box.
+/// Mask of the lights that reach a box.
 fn bits_at(lights: impl Iterator<Item = (Vec3, f32)>, bounds: &Aabb) -> u32 {
     lights
         .take(MAX_LIGHT_BITS)
         .enumerate()
         .filter(|(_, (origin, radius))| {
             let nearest = origin.clamp(bounds.mins, bounds.maxs.max(bounds.mins));
-            // the engine compares with a box around the light
+            // the engine tests the bounding box of a light
             (nearest - *origin).abs().max_element() <= *radius
         })
         .fold(0, |bits, (i, _)| bits | 1 << i)
 }
 
-/// Bits of the lights that reach a box in the model's space.
+/// Mask of the lights that reach a box in model space.
 pub(super) fn lights_at(lights: &[LocalLight], bounds: &Aabb) -> u32 {
     bits_at(
         lights.iter().map(|light| (light.local, light.radius)),
@@ -74,13 +74,13 @@ pub(super) fn lights_at(lights: &[LocalLight], bounds: &Aabb) -> u32 {
 }
 
 impl LocalView<'_> {
-    /// Bits of the lights that reach a box.
+    /// Mask of the lights that reach a box.
     pub fn lights_at(&self, bounds: &Aabb) -> u32 {
         lights_at(self.lights, bounds)
     }
 
-    /// Bits of the lights that reach a surface. Flat and curved ones are compared with where a light is in the world,
-    /// although the surface may have been moved away: what the engine does not light there stays dark.
+    /// Mask of the lights that reach a surface. The engine tests flat and curved surfaces of moved models with
+    /// world-space lights, so it leaves some of them dark.
     fn lights_on(&self, surface: &WorldSurface) -> u32 {
         let mut bits = self.lights_at(&surface.bounds);
         if surface.kind == SurfaceKind::Patch {
@@ -112,7 +112,7 @@ impl LocalView<'_> {
     }
 }
 
-/// What the surfaces of one model are added with.
+/// Parameters shared by the surfaces of one model.
 pub(super) struct SurfaceRun<'a> {
     pub world: &'a WorldData,
     pub materials: &'a Materials,
@@ -134,7 +134,7 @@ pub(super) struct SurfaceRun<'a> {
 }
 
 impl SurfaceRun<'_> {
-    /// Adds a surface if it is in sight. Returns it when its vertices have to be deformed first.
+    /// Adds a surface if it is not culled. Returns a surface whose vertices need deformation.
     pub fn add(&self, index: u32, out: &mut ClassicPart) -> Option<PendingDeform> {
         let surface = slice::get(&self.world.surfaces, index as usize)?;
         if surface.index_count == 0 || (self.no_curves && surface.kind == SurfaceKind::Patch) {
@@ -193,7 +193,7 @@ impl SurfaceRun<'_> {
 }
 
 impl SurfaceRun<'_> {
-    /// Adds triangles to the coverage of a sky. The engine draws a sky once for each fog that its surfaces store.
+    /// Adds triangles to the coverage of a sky. The engine draws a sky once for each fog of its surfaces.
     fn add_sky(
         &self,
         (material, fog): (u32, u32),
@@ -225,7 +225,7 @@ impl SurfaceRun<'_> {
     }
 }
 
-/// A surface in sight whose vertices have to be deformed.
+/// A visible surface whose vertices need deformation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PendingDeform {
     pub surface: u32,
@@ -235,7 +235,7 @@ pub(super) struct PendingDeform {
 }
 
 impl ClassicPart {
-    /// Adds a mesh to the surfaces.
+    /// Lists a mesh as a surface.
     pub(super) fn push_mesh(
         &mut self,
         mesh: &DynamicMesh,
@@ -260,7 +260,7 @@ impl ClassicPart {
     }
 }
 
-/// Replaces `out` by the dynamic lights as seen from a space given by an origin and axes.
+/// Writes the dynamic lights, transformed to the space of an origin and axes, to `out`.
 pub(super) fn local_lights(
     lights: &[DynamicLight],
     origin: Vec3,

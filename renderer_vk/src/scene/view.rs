@@ -5,7 +5,7 @@ use glam::{Mat4, Vec3, Vec4};
 use crate::api::RefDef;
 use crate::stereo::Stereo;
 
-/// A camera with its viewport. World space is id Tech's; clip space is Vulkan's (y down, depth 0..1).
+/// A camera with its viewport. World space is that of id Tech, clip space that of Vulkan (y down, depth 0 to 1).
 #[derive(Clone, Copy, Debug)]
 pub struct View {
     /// Camera position, world space.
@@ -18,24 +18,24 @@ pub struct View {
     pub tan_y: f32,
     /// World to clip space.
     pub world_to_clip: Mat4,
-    /// Distance of the near plane.
+    /// Distance of the near plane, units.
     pub near: f32,
-    /// Distance of the far plane.
+    /// Distance of the far plane, units.
     pub far: f32,
-    /// Pixels from the left and the top of the window, width, height.
+    /// Left, top, width and height in the window, pixels.
     pub viewport: [i32; 4],
-    /// Left and right are swapped (seen in a mirror), so front faces wind the other way.
+    /// Left and right are exchanged (inside a mirror), so front faces have the opposite winding.
     pub mirrored: bool,
-    /// Only what lies on the positive side of `xyz.p = w` shows (portal views).
+    /// Portal views show only the positive side of `xyz.p = w`.
     pub clip_plane: Option<Vec4>,
-    /// This is what a portal or mirror shows.
+    /// The view of a portal or mirror.
     pub is_portal: bool,
-    /// The camera's place beside the middle.
+    /// Offset of the camera for the eye that is drawn.
     pub stereo: Stereo,
 }
 
 impl View {
-    /// The view that `def` asks for, with depth from `near` to `far`.
+    /// The view of `def`, with depth from `near` to `far`.
     pub fn new(def: &RefDef, near: f32, far: f32) -> Self {
         let half = |degrees: f32| (degrees.clamp(0.1, 179.9).to_radians() * 0.5).tan();
         let mut view = Self {
@@ -56,7 +56,7 @@ impl View {
         view
     }
 
-    /// The view with the camera at another place beside the middle.
+    /// The view with another stereo offset.
     #[must_use]
     pub fn with_stereo(mut self, stereo: Stereo) -> Self {
         self.stereo = stereo;
@@ -64,19 +64,18 @@ impl View {
         self
     }
 
-    /// Distance of the faces of the box that the engine draws a sky on, and of the sun; its corners lie before the far
-    /// plane.
+    /// Distance of the sky box's faces and of the sun, units; the box's corners lie in front of the far plane.
     pub fn sky_distance(&self) -> f32 {
         self.far / 1.75
     }
 
-    /// Recomputes the matrix after a change of the other fields.
+    /// Recomputes the matrix from the other fields.
     pub fn update(&mut self) {
         self.world_to_clip = self.project(self.stereo);
     }
 
-    /// World to clip space for what is drawn in front of everything near, such as the weapon in the hands: its pictures
-    /// meet at the near plane. `None` where that is no difference.
+    /// World to clip space for geometry in front of everything else, such as the weapon in first person: both eyes'
+    /// pictures coincide at the near plane. `None` if it equals the other matrix.
     pub fn near_world_to_clip(&self) -> Option<Mat4> {
         (self.stereo.slope != 0.0).then(|| {
             self.project(Stereo {
@@ -94,7 +93,7 @@ impl View {
             Vec4::new(-left.z, -up.z, forward.z, 0.0),
             Vec4::W,
         );
-        // right, down, forward; depth 0 at the near and 1 at the far plane
+        // clip axes: right, down, forward
         let depth = self.far / (self.far - self.near);
         let project = Mat4::from_cols(
             Vec4::new(1.0 / self.tan_x, 0.0, 0.0, 0.0),
@@ -105,7 +104,7 @@ impl View {
         project * rotate * Mat4::from_translation(-self.origin)
     }
 
-    /// Depth of what is so far in front of the camera, 0 and 1 outside of the near and far plane.
+    /// Depth at a distance in front of the camera; 0 before the near plane, 1 beyond the far plane.
     pub fn depth_at(&self, distance: f32) -> f32 {
         if distance <= self.near {
             return 0.0;
@@ -114,7 +113,7 @@ impl View {
         depth.clamp(0.0, 1.0)
     }
 
-    /// The four side planes of the view's pyramid, pointing inwards: `xyz.p >= w` is inside.
+    /// The four side planes of the frustum, facing inwards: `xyz.p >= w` is inside.
     pub fn frustum(&self) -> [Vec4; 4] {
         let [forward, left, up] = self.axis;
         let camera = self.origin + left * self.stereo.offset();
@@ -141,7 +140,7 @@ mod tests {
         c.truncate() / c.w
     }
 
-    /// A view of 90 degrees across and down.
+    /// A view of 90 × 90 degrees.
     fn square() -> View {
         let def = RefDef {
             fov_x: 90.0,
@@ -158,7 +157,7 @@ mod tests {
         assert!(middle.abs_diff_eq(Vec3::ZERO, 1e-5), "{middle}");
         let far = clip(&view, Vec3::new(1000.0, 0.0, 0.0));
         assert!((far.z - 1.0).abs() < 1e-4, "{far}");
-        // left of the view is the negative x of clip space, up is the negative y (Vulkan)
+        // left is negative x in clip space, up is negative y (Vulkan)
         assert!((clip(&view, Vec3::new(10.0, 10.0, 0.0)).x + 1.0).abs() < 1e-5);
         assert!((clip(&view, Vec3::new(10.0, 0.0, 10.0)).y + 1.0).abs() < 1e-5);
     }
@@ -173,10 +172,10 @@ mod tests {
         });
         let left = clip(&view, Vec3::new(64.0, 20.0, 0.0));
         assert!((left.x - middle.x).abs() < 1e-5);
-        // to the left eye what is nearer lies farther to the right
+        // near points move right for the left eye
         assert!(clip(&view, Vec3::new(32.0, 0.0, 0.0)).x > 0.01);
         assert!(clip(&view, Vec3::new(128.0, 0.0, 0.0)).x < -0.005);
-        // what is on the edge of the picture is on the edge of the frustum
+        // points on the edge of the picture lie on a plane of the frustum
         for (x, edge) in [(-1.0, 0), (1.0, 1)] {
             let p = view
                 .world_to_clip

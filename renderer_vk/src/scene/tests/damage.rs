@@ -1,4 +1,4 @@
-//! Scenes that make no sense.
+//! Invalid scenes.
 
 use super::{check_ranges, check_surfaces, def, entity, game, gather, room};
 use crate::Error;
@@ -46,7 +46,7 @@ fn bad_entities_do_no_harm() {
         .gather_classic(&game.input(Some(&world)), &def())
         .unwrap();
     assert!(views[0].dlights.is_empty());
-    // handle 0 shows its axes
+    // handle 0 draws axes
     scene.add_entity(&entity(EntityKind::Model));
     let views = gather(&mut scene, &game, Some(&world), &def());
     let axes = game.materials.internal().axes;
@@ -56,7 +56,7 @@ fn bad_entities_do_no_harm() {
     assert!(matches!(failed, Err(Error::EntityKind { .. })));
 }
 
-/// Random numbers, often the ones that break things.
+/// Random numbers, often extreme ones.
 struct Numbers(Random);
 
 impl Numbers {

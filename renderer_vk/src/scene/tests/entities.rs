@@ -1,4 +1,4 @@
-//! What the game adds: models, persons, shadows, brush models, polygons.
+//! Content that the game adds: models, players, shadows, brush models, polygons.
 
 use super::{def, entity, game, gather, gather_traced, room};
 use crate::api::{DynamicLight, EntityKind, PolyVert, RefDef, RefEntity, rdflags, renderfx};
@@ -45,9 +45,9 @@ fn models_are_lerped_and_placed() {
     assert_eq!(instance.viewer, Vec3::new(-150.0, 0.0, 0.0));
     assert_eq!(instance.time, 1.5);
     assert!((instance.color[2] - 0.2).abs() < 1e-6);
-    // skin 1 of its two is the second material
+    // skin 1 of its two has the second material
     assert_eq!(game.materials.get(view.meshes[0].material).name, "t/glass");
-    // an entity's own material wins
+    // the entity's own material takes precedence
     let glass = view.meshes[0].material;
     scene.add_entity(&RefEntity {
         custom_shader: i32::try_from(glass).unwrap(),
@@ -56,7 +56,7 @@ fn models_are_lerped_and_placed() {
     });
     let views = gather(&mut scene, &game, None, &none);
     assert_eq!(views[0].meshes[0].material, glass);
-    // a skin without that surface shows the default
+    // a skin without that surface has the default material
     scene.add_entity(&RefEntity {
         custom_skin: 7,
         skin_num: -3,
@@ -119,7 +119,7 @@ fn persons_show_where_they_should() {
             .origin
             .abs_diff_eq(Vec3::new(600.0, 0.0, 0.0), 1e-3)
     );
-    // traced: both are there, with their flags, and the mirror is listed
+    // in the traced look both are present, with their flags, and the mirror is listed
     for e in [
         at(renderfx::FIRST_PERSON),
         at(renderfx::THIRD_PERSON),
@@ -158,7 +158,7 @@ fn surfaces_that_face_the_camera_face_it_in_mirrors_too() {
         old_origin: Vec3::new(250.0, 0.0, 0.0),
         ..entity(EntityKind::PortalSurface)
     };
-    // seen from above
+    // the camera looks down
     let turn = glam::Quat::from_rotation_y(0.7);
     let def = RefDef {
         view_axis: [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| turn * axis),
@@ -199,7 +199,7 @@ fn surfaces_that_face_the_camera_face_it_in_mirrors_too() {
     assert_eq!((direct.0, through.0), (1, 2));
     assert!(same(&direct.1, straight_on) && same(&through.1, in_mirror));
     assert!(!same(&direct.1, &through.1));
-    // without a mirror in sight, and for what mirrors do not show, there is one for all
+    // one copy where no mirror is visible, and for geometry that mirrors do not show
     assert_eq!(shown(true, 0, false)[0].0, 0);
     let first_person = shown(true, renderfx::FIRST_PERSON, true);
     assert_eq!((first_person.len(), first_person[0].0), (1, 0));
@@ -231,7 +231,7 @@ fn models_cast_planar_shadows_when_asked() {
         panic!("no shadow");
     };
     assert_eq!(Some(mesh.material), game.materials.internal().shadow);
-    // without any light the model is flattened straight down? there is none to go by: it keeps to the plane's height
+    // without light there is no shadow direction: the shadow is flattened along z
     let first = mesh.first_vertex as usize;
     let flat = &views[0].vertices[first..first + mesh.vertex_count as usize];
     assert!(
@@ -258,7 +258,7 @@ fn opaque_models_cast_shadow_volumes_when_asked() {
     };
     assert!(volumes(&game, standing).is_empty());
     game.settings.shadows = crate::settings::ModelShadows::Volumes;
-    // one triangle that the sun meets from behind: three sides, two triangles each
+    // one triangle that faces away from the sun: three sides, two triangles each
     assert_eq!(volumes(&game, standing), [(0, 18)]);
     let flags = [
         renderfx::NO_SHADOW,
@@ -280,10 +280,10 @@ fn opaque_models_cast_shadow_volumes_when_asked() {
     assert!(volumes(&game, glass).is_empty());
 }
 
-/// The instance of a scene's only entity; 0 is the world's.
+/// Instance of a scene's only entity; 0 is the world.
 const DOOR: u32 = 1;
 
-/// A brush model, which an entity moves.
+/// A brush model that an entity moves.
 fn door(game: &mut Registration) -> RefEntity {
     RefEntity {
         model: game.model("*1"),
@@ -305,13 +305,13 @@ fn brush_models_move_with_their_entity() {
     let views = gather(&mut scene, &game, Some(&world), &def());
     let instance = views[0].instances[DOOR as usize];
     assert_eq!(instance.origin, placed.origin);
-    // unlike the world itself it has an entity's light
+    // unlike the world, it has entity light
     assert!(instance.flags & c::INSTANCE_UNLIT == 0 && instance.ambient.x > 0.0);
     let of_door = |s: &&DrawSurface| s.instance == DOOR;
     // its front and, seen from the side, one more
     let count = views[0].look.surfaces.iter().filter(of_door).count();
     assert!((1..=3).contains(&count), "{count}");
-    // it asks in vain to be seen in mirrors alone
+    // the engine ignores `renderfx` of brush models
     scene.add_entity(&RefEntity {
         renderfx: renderfx::THIRD_PERSON,
         ..placed
@@ -352,10 +352,10 @@ fn brush_models_keep_one_bit_for_all_lights() {
         let bits = surfaces.filter(|s| s.instance == DOOR).map(|s| s.dlights);
         bits.collect()
     };
-    // its sides are compared with the light as if they had not moved, and miss it
+    // its sides are tested with the light as if they had not moved, and are not lit
     let one = bits(&[light]);
     assert_eq!(one.iter().filter(|bits| **bits == 1).count(), 1, "{one:?}");
-    // of several lights the first one counts, whichever reaches the model
+    // of several lights, the first one's bit is set, whichever reaches the model
     assert_eq!(bits(&[light, light]), one);
     assert!(bits(&[short, light]).iter().all(|bits| bits & !1 == 0));
     assert!(bits(&[short]).iter().all(|bits| *bits == 0));

@@ -1,4 +1,4 @@
-//! Views gathered without a GPU.
+//! Tests of gathering, without a GPU.
 
 mod damage;
 mod entities;
@@ -165,7 +165,7 @@ fn gather_traced(
     view
 }
 
-/// What must hold for every gathered view of sane entities.
+/// Checks every gathered view of valid entities.
 fn check_finite(view: &ViewScene) {
     assert!(
         view.vertices
@@ -174,7 +174,7 @@ fn check_finite(view: &ViewScene) {
     );
 }
 
-/// What must hold for every gathered view.
+/// Checks every gathered view.
 fn check_ranges(view: &ViewScene) {
     assert!(view.vertices.iter().all(|v| v.position.is_finite()));
     for mesh in &view.meshes {
@@ -186,7 +186,7 @@ fn check_ranges(view: &ViewScene) {
     }
 }
 
-/// What must hold for every gathered view of the classic look.
+/// Checks every gathered view of the classic look.
 fn check_surfaces(view: &ClassicScene, world: Option<&WorldData>) {
     assert!(view.look.surfaces.is_sorted_by_key(|s| s.sort_key));
     for surface in &view.look.surfaces {

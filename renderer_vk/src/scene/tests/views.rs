@@ -1,4 +1,4 @@
-//! What of the map a view gathers.
+//! Geometry of the map in gathered views.
 
 use super::{def, entity, game, gather, gather_traced, room};
 use crate::api::{EntityKind, RefDef, RefEntity, rdflags};
@@ -24,8 +24,8 @@ fn the_world_in_sight_is_sorted_and_culled() {
         .collect();
     assert!(sorts.is_sorted(), "{sorts:?}");
     assert_eq!(sorts[0], shaderscript::sort::PORTAL);
-    // six walls (the box of the one behind is not wholly outside any one plane), the mirror, the sprite; the sky is
-    // listed apart
+    // six walls (the box of the one behind is not completely outside any single plane), the mirror, the sprite; the sky
+    // is listed separately
     assert_eq!(view.look.surfaces.len(), 8);
     assert_eq!(view.look.skies.len(), 1);
     assert_eq!(view.meshes.len(), 1);
@@ -81,7 +81,7 @@ fn without_the_world_only_entities_show() {
             .ambient
             .abs_diff_eq(Vec3::splat(182.0 / 255.0), 1e-5)
     );
-    // what was added is gone
+    // the added content is dropped
     let views = gather(&mut scene, &game, Some(&world), &none);
     assert!(views[0].look.surfaces.is_empty());
     let views = gather(&mut scene, &game, None, &none);
@@ -140,7 +140,7 @@ fn real_maps_gather_from_every_spawn() {
     }
 }
 
-/// The surfaces in sight are those of the leafs in sight, found here without marks.
+/// The visible surfaces are those of the visible leafs, found here without marks.
 fn check_against_leafs(world: &WorldData, game: &Registration, view: &ClassicScene) {
     let bsp = &world.relit.bsp;
     let frustum = view.view.frustum();
@@ -198,7 +198,7 @@ fn check_against_leafs(world: &WorldData, game: &Registration, view: &ClassicSce
         .collect();
     for first in expected {
         let own = world.surfaces.iter().filter(|s| s.first_index == first);
-        // curves have levels of detail, other surfaces perhaps a copy with the stored normal
+        // curves have levels of detail, others may have a copy with the stored normal
         let curve = own.clone().any(|s| s.lod.is_some());
         let mut copies = own.filter_map(|s| s.classic.map(|copy| copy.first_index));
         assert!(
