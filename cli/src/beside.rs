@@ -1,18 +1,18 @@
-//! What lies beside a map's own file, where it is in no game folder.
+//! Files beside a map's own file, if the map is in no game folder.
 
 use std::path::Path;
 
 use anyhow::{Context, Result};
 use relight::MemoryFiles;
 
-/// The files beside `file` that belong to it, under the paths that they would have in a game folder: lights given by
-/// hand (`NAME.lights`) and lightmaps (`NAME/lm_0000.tga` and so on).
+/// Files beside `file` that belong to the map, under their paths in a game folder: lights in a file (`NAME.lights`) and
+/// lightmaps (`NAME/lm_0000.tga` and so on).
 ///
 /// # Errors
-/// One of them is there and cannot be read.
+/// Such a file exists and cannot be read.
 pub fn beside(file: &Path) -> Result<MemoryFiles> {
     let mut found = MemoryFiles::new();
-    // A path that ends in `..` has no name, and nothing lies beside it.
+    // a path that ends in `..` has no name, so no files belong to it
     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
     let mut take = |path: &Path, game_path: String| -> Result<()> {
         let bytes =

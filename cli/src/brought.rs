@@ -1,15 +1,15 @@
-//! What maps of formats without scripts bring along: their pictures and materials before the game's.
+//! Images and materials in maps of formats without scripts; they precede the game's.
 
 use q3bsp::Bsp;
 use relight::{GameFiles, Materials, Overlay, map_files};
 
-/// A game as a map of such a format sees it.
+/// A game with the files of such a map.
 pub struct Brought<'a> {
-    /// The map's pictures and script, and the game's files behind them.
+    /// The map's images and script, then the game's files.
     pub files: Overlay<&'a dyn GameFiles>,
-    /// The materials of both.
+    /// The materials of the map and of the game.
     pub materials: Materials,
-    /// What was odd about them.
+    /// Warnings about the map's images and materials.
     pub warnings: Vec<String>,
 }
 

@@ -1,4 +1,4 @@
-//! `relight calibration`: how well the light that is found agrees with the light that the map compiler stored.
+//! `relight calibration`: agreement of calibrated light with the light that the map compiler stored.
 
 use std::path::PathBuf;
 
@@ -18,25 +18,26 @@ use crate::view::open;
 
 /// Measure how well traced light agrees with maps' lightmaps, before and after calibration
 ///
-/// Compared is the irradiance that tracing gives (direct, bounced and ambient) with stored light, at measurements that
-/// fitting did not see: the median of |log2(traced / stored)| in stops, before (what directives say) and after. `sum` is
-/// all traced light over all stored light; `gamma` what the map's compiler encoded light with, 1 for nothing.
+/// Compares traced irradiance (direct, bounced and ambient) with stored light at samples held out of the fit. Prints
+/// the median of |log2(traced / stored)| in stops, with lights as the map's directives define them (before) and
+/// calibrated (after). `sum` is all traced light over all stored light; `gamma` is the exponent by which the compiler
+/// encoded light, 1 for linear light.
 ///
 /// Example: relight calibration oa_dm1 fan --cache ~/.cache/relight
 #[derive(Args, Debug)]
 pub struct CalibrationArgs {
     #[command(flatten)]
     chosen: Maps,
-    /// Measurements taken, about; more are more exact and take longer
+    /// Number of samples, approximately; more are more exact and take longer
     #[arg(long)]
     samples: Option<usize>,
-    /// Seed of the choice of measurements
+    /// Seed of the choice of samples
     #[arg(long)]
     seed: Option<u64>,
-    /// Keep what calibration finds in this folder, and take it from there
+    /// Cache calibrations in this folder
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
-    /// Hide the light entities that maps kept, and count those that are found again
+    /// Hide the map's light entities from the fit, and count those that it finds again
     #[arg(long)]
     hide_entities: bool,
     /// Count lightmap texels near point lights that these lights make too bright
@@ -47,7 +48,7 @@ pub struct CalibrationArgs {
     json: bool,
 }
 
-/// Runs the command: one line a map, then the medians and the worst of all maps.
+/// Runs the command: prints a line a map, then the medians and the worst of all maps.
 ///
 /// # Errors
 /// A map cannot be found or read.
@@ -151,7 +152,7 @@ pub fn run(args: &CalibrationArgs) -> Result<()> {
     Ok(())
 }
 
-/// By what factor calibration brings light nearer to stored light.
+/// Error before calibration over error after it.
 fn ratio(report: &CalibrationReport) -> f32 {
     report.before.median_stops / report.after.median_stops.max(1e-4)
 }
@@ -159,7 +160,7 @@ fn ratio(report: &CalibrationReport) -> f32 {
 fn in_words(found: &Recovery) -> String {
     format!(
         "{} light entities hidden: {} found within {FOUND_WITHIN} units ({:.1} in the median), {} of them also within {:.0} % of their power; \
-         those found had {:.0} % of the power. All lights put in have {:.2} of the power hidden; {} of them, with {:.0} % of their power, are near none.",
+         those found had {:.0} % of the power. All placed lights have {:.2} of the hidden power; {} of them, with {:.0} % of their power, are near no hidden light.",
         found.hidden,
         found.found,
         found.median_distance,

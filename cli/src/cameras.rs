@@ -1,4 +1,4 @@
-//! `relight cameras`: places to look at maps from, chosen by a rule.
+//! `relight cameras`: camera positions in maps, chosen by a rule.
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -9,9 +9,9 @@ use relight::viewpoints::{self, VIEW_HEIGHT, Viewpoint};
 use crate::game::Game;
 use crate::view::{map_name, open};
 
-/// List places to look at maps from: intermission cameras and spawn points
+/// List camera positions in maps: intermission cameras and spawn points
 ///
-/// Prints a line for each: the map, a tab, and X Y Z YAW as the game's setviewpos takes them. The camera is 26 units above.
+/// Prints a line for each: the map, a tab, and X Y Z YAW for the game's setviewpos. The camera is 26 units above.
 ///
 /// Examples: relight cameras oa_dm1; relight cameras --views 1 --every 3
 #[derive(Args, Debug)]
@@ -21,10 +21,10 @@ pub struct CamerasArgs {
     /// Views of each map: the camera of the intermission first, then spawn points, evenly out of the map's list
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = crate::numbers::count)]
     views: usize,
-    /// Every how many maps of the list in alphabetical order, when none is named
+    /// Step through the alphabetical list of all maps, if no map is named
     #[arg(long, default_value_t = 1, value_parser = crate::numbers::count)]
     every: usize,
-    /// How many maps of that list are left out at its start
+    /// Number of maps to skip at the start of that list
     #[arg(long, default_value_t = 0)]
     skip: usize,
     /// Maps: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp file, a pack (.pk3) with one map, or pack.pk3:maps/x.bsp. Without
@@ -33,18 +33,18 @@ pub struct CamerasArgs {
     maps: Vec<String>,
 }
 
-/// Where a player is put: origin and turn, whole units and degrees as `setviewpos` takes them.
+/// A player's position: whole units and degrees, for `setviewpos`.
 pub struct Place {
-    /// Units.
+    /// Player origin, units.
     pub origin: Vec3,
-    /// Degrees.
+    /// Yaw, degrees.
     pub yaw: f32,
 }
 
 /// Prints a line for each place: the map, a tab, `x y z yaw` for the game's `setviewpos`.
 ///
 /// # Errors
-/// A map cannot be read, or one that is named has no place for a player.
+/// A map cannot be read, or a named map has no place for a player.
 pub fn run(args: &CamerasArgs) -> Result<()> {
     let mut found = Vec::new();
     if args.maps.is_empty() {
@@ -92,7 +92,7 @@ fn places_of(files: &dyn GameFiles, path: &str, count: usize) -> Result<Vec<Plac
     Ok(places(&bsp.entities(), count))
 }
 
-/// The intermission's camera and spawn points, `count` at most.
+/// The intermission camera and spawn points, at most `count`.
 pub fn places(entities: &[q3bsp::Entity], count: usize) -> Vec<Place> {
     let mut views: Vec<Viewpoint> = viewpoints::intermission(entities).into_iter().collect();
     let spawns: Vec<_> = viewpoints::spawn_views(entities).collect();

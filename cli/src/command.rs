@@ -8,7 +8,7 @@ use clap::{Parser, Subcommand};
 use crate::outcome::parse;
 use crate::{calibration, cameras, compare, convert, info, lights, material, render};
 
-/// Maps of id Tech 3 games: what is in them, converted, relit
+/// Maps of id Tech 3 games: contents, conversion, pictures with new light
 #[derive(Parser, Debug)]
 #[command(name = "relight", version)]
 pub struct Cli {
@@ -16,7 +16,7 @@ pub struct Cli {
     command: Command,
 }
 
-// Each is described where its arguments are: a comment here would hide the rest of that description.
+// No documentation comments on the variants: clap would show them in place of the descriptions of the arguments.
 #[derive(Subcommand, Debug)]
 enum Command {
     Calibration(calibration::CalibrationArgs),
@@ -29,7 +29,7 @@ enum Command {
     Render(Box<render::RenderArgs>),
 }
 
-/// What earlier versions had: subcommand, the option or nothing for the subcommand itself, and what replaces it.
+/// Names of earlier versions: subcommand, option (empty for the subcommand itself), replacement.
 const REPLACED: [(&str, &str, &str); 13] = [
     ("cameras", "--each", "--views"),
     ("convert", "--exposure", "--light-scale"),
@@ -46,10 +46,10 @@ const REPLACED: [(&str, &str, &str); 13] = [
     ("render", "--traced", "--look traced"),
 ];
 
-/// Runs the subcommand that the arguments of the process name.
+/// Runs the subcommand that the process arguments name.
 ///
 /// # Errors
-/// What the subcommand says.
+/// Those of the subcommand.
 pub fn run() -> Result<ExitCode> {
     match parse::<Cli>(&REPLACED).command {
         Command::Calibration(args) => calibration::run(&args),

@@ -1,4 +1,4 @@
-//! `relight compare`: how alike pictures of one view are, and the pictures beside each other.
+//! `relight compare`: similarity of pictures of one view, and the pictures side by side.
 
 use std::path::PathBuf;
 
@@ -10,29 +10,29 @@ use crate::pictures::{read, write};
 
 /// Compare pictures of one view
 ///
-/// Prints a line for each picture: structural similarity (1: the same), mean FLIP (0: the same), mean absolute and root
-/// mean square difference (0 to 255), share of pixels that differ by more than 8, mean luminance of both; of folders a table.
+/// Prints a line for each picture: structural similarity (1: equal), mean FLIP (0: equal), mean absolute and root mean
+/// square difference (0 to 255), share of pixels that differ by more than 8, mean luminance of both. For folders it
+/// prints a table.
 ///
 /// Examples: relight compare reference.png other.png --side-by-side both.png; relight compare opengl1 vk --worst-to worst
 #[derive(Args, Debug)]
 pub struct CompareArgs {
-    /// The picture to compare with (PNG, JPEG or TGA), or a folder of pictures
+    /// Reference picture (PNG, JPEG or TGA), or a folder of pictures
     reference: PathBuf,
-    /// Pictures to compare with it; folders if the first is one, whose pictures have the same names
+    /// Pictures to compare with it; folders with pictures of the same names, if the reference is a folder
     others: Vec<PathBuf>,
-    /// Write all pictures beside each other to this file (PNG)
+    /// Write all pictures side by side to this file (PNG)
     #[arg(long, value_name = "FILE")]
     side_by_side: Option<PathBuf>,
-    /// Of folders: write the pictures that are least alike to this folder, beside the reference and the difference
+    /// For folders: write the least similar pictures to this folder, with the reference and the difference
     #[arg(long, value_name = "DIR", conflicts_with = "side_by_side")]
     worst_to: Option<PathBuf>,
-    /// How many of them
+    /// Number of these pictures
     #[arg(long, default_value_t = 12)]
     worst: usize,
 }
 
-/// Prints one line for each picture: structural similarity (1 = the same), mean FLIP (0 = the same), mean absolute
-/// and root mean square difference (0..255), share of pixels that differ visibly, mean luminance of both.
+/// Prints one line for each picture; the help text lists its figures.
 pub fn run(args: &CompareArgs) -> Result<()> {
     if args.reference.is_dir() {
         let to = args.worst_to.as_deref();

@@ -31,9 +31,9 @@ use inputs::Input;
 
 /// Write maps for other programs
 ///
-/// Geometry with curves, normals and both sets of texture coordinates, materials with their images, lights, entities
-/// and cameras. A file appears whole or not at all. Exit code: 0 when everything was written, 2 when some map cannot be
-/// read, 1 for everything else.
+/// Writes geometry with curves, normals and both sets of texture coordinates, materials with their images, lights,
+/// entities and cameras. Files are written atomically. Exit code: 0 if all maps were written, 2 if a map cannot be
+/// read, 1 for other errors.
 ///
 /// Examples: relight convert oa_dm1 -o oa_dm1.glb; relight convert pak1-maps.pk3 -o converted;
 /// relight convert pak1-maps.pk3:maps/kaos.bsp my.bsp -o out --format gltf
@@ -42,7 +42,7 @@ pub struct ConvertArgs {
     /// Maps: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp file, a pack (.pk3) for all maps in it, or pack.pk3:maps/x.bsp
     #[arg(required = true, value_name = "MAP")]
     inputs: Vec<String>,
-    /// File to write, or for several maps the folder; maps of several packs get a folder each
+    /// Output file, or for several maps the folder; maps of several packs get a folder each
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// Format; default: that of the output's extension, else the first
@@ -53,45 +53,44 @@ pub struct ConvertArgs {
     /// Length of an id unit in the output
     #[arg(long, default_value_t = METRES_PER_UNIT, value_parser = positive)]
     scale: f32,
-    /// What becomes of lightmaps; by default vertices, and strip where lights are asked for
+    /// Treatment of lightmaps; default: vertices, and strip if lights are requested
     #[arg(long, value_enum)]
     lightmaps: Option<LightmapChoice>,
-    /// Whether lights are written, and lamps shine as strongly as in the map; by default where lightmaps are stripped
+    /// Write lights, and let lamps emit as strongly as in the map; default: if lightmaps are stripped
     #[arg(long, value_enum)]
     lights: Option<LightChoice>,
-    /// What all light is multiplied by; by default so much that the map is as bright as in the game
+    /// Factor of all light; default: the factor that makes the map as bright as in the game
     #[arg(long, value_parser = positive)]
     light_scale: Option<f32>,
-    /// Where images go: as usual for the format, inside the file, into a folder beside it, or nowhere
+    /// Place of images: as usual for the format, inside the file, in a folder beside it, or none
     #[arg(long, value_enum, default_value_t = ImageChoice::Usual)]
     images: ImageChoice,
-    /// How sides of brushes in a .map say how their textures lie: as the editors of the map's game have it, as brush
-    /// primitives (brushDef), as Valve 220, or in Quake's first form
+    /// Texture projection of brush sides in a .map: as usual for the map's game, brush primitives (brushDef), Valve
+    /// 220, or the format of Quake
     #[arg(long, value_enum, default_value_t = BrushChoice::Usual)]
     brushes: BrushChoice,
-    /// Write moving textures as animations, which strict readers of glTF refuse
+    /// Write moving textures as animations, which strict glTF readers reject
     #[arg(long)]
     animate: bool,
-    /// The sky as a box, as a ball with one picture all round, or none
+    /// The sky as a box, as a sphere with one panorama, or none
     #[arg(long, value_enum, default_value_t = SkyChoice::Box)]
     sky: SkyChoice,
-    /// Let the sky shine as strongly as its light in the map; it then looks brighter than in the game
+    /// Let the sky emit as strongly as its light in the map; it then looks brighter than in the game
     #[arg(long)]
     sky_light: bool,
     /// Largest distance of a curve from its mesh, id units
     #[arg(long, default_value_t = 4.0, value_parser = positive)]
     subdivisions: f32,
-    /// Fit lights to the lightmaps first, find those again that the compiler left out (some seconds a map), and write
-    /// them
+    /// Fit lights to the lightmaps first, find those that the compiler left out (seconds a map), and write them
     #[arg(long)]
     calibrate: bool,
-    /// Keep what calibration finds in this folder, and take it from there
+    /// Cache calibrations in this folder
     #[arg(long, value_name = "DIR", requires = "calibrate")]
     cache: Option<PathBuf>,
-    /// Maps converted at a time; by default one a core
+    /// Number of maps converted in parallel; default: one a core
     #[arg(long)]
     jobs: Option<NonZeroUsize>,
-    /// Print what was written as JSON
+    /// Print JSON about the written files
     #[arg(long)]
     json: bool,
     /// Print every warning instead of their number
@@ -101,9 +100,9 @@ pub struct ConvertArgs {
 
 #[derive(ValueEnum, Clone, Copy, Debug)]
 enum LightmapChoice {
-    /// Into colours of vertices: every program shows the map lit
+    /// As vertex colours: every program shows the map lit
     Vertices,
-    /// For programs that know MOZ_lightmap
+    /// For programs with MOZ_lightmap
     Keep,
     /// For programs that compute light
     Strip,
@@ -115,7 +114,8 @@ enum LightChoice {
     Strip,
 }
 
-/// What becomes of lightmaps and whether lights are written. Light is not written twice unless that is asked for.
+/// Treatment of lightmaps, and whether lights are written. Both together only on request, because light would count
+/// twice.
 fn lighting(args: &ConvertArgs) -> (Lightmaps, bool) {
     let lightmaps = match (args.lightmaps, args.lights) {
         (Some(LightmapChoice::Vertices), _) => Lightmaps::Vertices,
@@ -161,7 +161,7 @@ fn parse_format(text: &str) -> Result<Format, String> {
     })
 }
 
-/// What is told about a map that was written.
+/// Report about a written map.
 #[derive(Serialize)]
 struct Converted {
     map: String,
@@ -177,16 +177,16 @@ struct Converted {
     milliseconds: u128,
 }
 
-/// What is told about a map that was not.
+/// Report about a map that was not written.
 #[derive(Serialize)]
 struct Failure {
     map: String,
     error: String,
-    /// Whether the map is at fault.
+    /// The map's file is invalid, in contrast to an output error.
     bad_input: bool,
 }
 
-/// Everything that the threads share.
+/// Data that the threads share.
 struct Shared<'a> {
     args: &'a ConvertArgs,
     format: Format,
@@ -234,7 +234,7 @@ pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
                     let (Some(input), Some(output), Some(slot)) =
                         (inputs.get(index), outputs.get(index), results.get(index))
                     else {
-                        // All maps are taken.
+                        // all maps are taken
                         break;
                     };
                     bar.set_message(input.to_string());
@@ -258,7 +258,7 @@ pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
             Err(one) => failures.push(one),
         }
     }
-    tell(args, &converted, &failures)?;
+    report(args, &converted, &failures)?;
     Ok(if failures.is_empty() {
         ExitCode::SUCCESS
     } else if failures.iter().any(|f| f.bad_input) {
@@ -268,7 +268,7 @@ pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
     })
 }
 
-/// The format asked for: by name, by the output's extension, or the first of all.
+/// The format: by name, by the output's extension, or the first one.
 fn format_of(args: &ConvertArgs) -> Result<Format> {
     let by_name = args
         .output
@@ -311,7 +311,7 @@ fn convert(shared: &Shared, input: &Input, output: &Path) -> Result<Converted, F
         Some(own) => (&own.files as &dyn GameFiles, &own.materials),
         None => (&found as &dyn GameFiles, shared.materials),
     };
-    // JSON is the file as it is.
+    // the JSON document describes the map file alone
     let external = match shared.format {
         Format::Json => Ok(0),
         _ => external_lightmaps(&mut bsp, files, &input.game_path()),
@@ -376,7 +376,7 @@ impl Converted {
     }
 }
 
-fn tell(args: &ConvertArgs, converted: &[Converted], failures: &[Failure]) -> Result<()> {
+fn report(args: &ConvertArgs, converted: &[Converted], failures: &[Failure]) -> Result<()> {
     if args.json {
         let all = serde_json::json!({ "converted": converted, "failures": failures });
         println!("{}", serde_json::to_string_pretty(&all)?);

@@ -1,16 +1,16 @@
-//! The game and the maps that a command line names.
+//! Command-line arguments for the game and the maps.
 
 use std::path::PathBuf;
 
 use clap::Args;
 use relight::{FileError, SearchPath};
 
-// No documentation comments on these two: clap would show them in place of a subcommand's own description.
+// No documentation comments on these structures: clap would show them in place of the subcommand's description.
 
 // The game whose files a command reads.
 #[derive(Args, Debug)]
 pub struct Game {
-    /// Game folder with packs, or one pack (.pk3); give several in rising priority (the base game first, the mod after
+    /// Game folder with packs, or one pack (.pk3); repeat it in ascending priority (the base game first, the mod after
     /// it)
     #[arg(
         long = "game",
@@ -38,7 +38,7 @@ impl Game {
     }
 }
 
-// The maps that a command reads, and their game.
+// Maps, and their game.
 #[derive(Args, Debug)]
 pub struct Maps {
     /// Maps: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp file, a pack (.pk3) with one map, or pack.pk3:maps/x.bsp

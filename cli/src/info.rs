@@ -1,4 +1,4 @@
-//! `relight info`: what is in maps, and where their light comes from.
+//! `relight info`: contents of maps, and sources of their light.
 
 mod describe;
 mod table;
@@ -23,11 +23,10 @@ use crate::outcome::{BAD_INPUT, one_sentence};
 use crate::scripts::load_scripts;
 use describe::MapInfo;
 
-/// List what maps hold, and where their light comes from
+/// List the contents of maps, and the sources of their light
 ///
 /// One map in full, several as a table: format, lumps, bounds, entities, materials and which are missing, lightmaps,
-/// fogs, clusters and how much they see, lights by their evidence, warnings. Exit code: 0, or 2 when some map cannot be
-/// read.
+/// fogs, clusters and their visibility, lights by source, warnings. Exit code: 0, or 2 if a map cannot be read.
 ///
 /// Examples: relight info oa_dm1; relight info pak1-maps.pk3; relight info my.bsp --json
 #[derive(Args, Debug)]
@@ -37,16 +36,16 @@ pub struct InfoArgs {
     /// Print JSON in place of a table
     #[arg(long)]
     json: bool,
-    /// A table also for a single map
+    /// Print a table for a single map, too
     #[arg(long)]
     short: bool,
     /// List the emitting materials of each map
     #[arg(long)]
     emitters: bool,
-    /// Fit the lights to the maps' lightmaps, and tell how well they agree with them
+    /// Fit the lights to the maps' lightmaps, and print the agreement
     #[arg(long)]
     calibrate: bool,
-    /// Keep what calibration finds in this folder, and take it from there
+    /// Cache calibrations in this folder
     #[arg(long, value_name = "DIR", requires = "calibrate")]
     cache: Option<PathBuf>,
     /// Maps: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp file, a pack (.pk3) for all maps in it, or pack.pk3:maps/x.bsp.
@@ -55,14 +54,14 @@ pub struct InfoArgs {
     maps: Vec<String>,
 }
 
-/// What is told about a map that cannot be loaded.
+/// Report about a map that cannot be loaded.
 #[derive(Serialize)]
 struct Failure {
     map: String,
     error: String,
 }
 
-/// Loads the maps and prints what is in them. Exit code 2 when one of them cannot be read.
+/// Loads the maps and prints their contents. Exit code 2 if a map cannot be read.
 pub fn run(args: &InfoArgs) -> Result<ExitCode> {
     let mut files = args.game.files()?;
     let mut sources = Vec::new();
@@ -108,7 +107,7 @@ pub fn run(args: &InfoArgs) -> Result<ExitCode> {
     } else {
         match infos.as_slice() {
             [] => {}
-            // A single map in full, several as a table.
+            // a single map in full, several as a table
             [one] if !args.short => table::print_map(one, args.emitters),
             many => table::print_table(many, args.emitters),
         }

@@ -22,7 +22,7 @@ pub struct Cli {
     command: Command,
 }
 
-// Each is described where its arguments are: a comment here would hide the rest of that description.
+// No documentation comments on the variants: clap would show them in place of the descriptions of the arguments.
 #[derive(Subcommand, Debug)]
 enum Command {
     Estimators(estimators::EstimatorsArgs),
@@ -31,16 +31,16 @@ enum Command {
     Measure(measure::MeasureArgs),
 }
 
-/// What earlier versions had: subcommand, option, and what replaces it.
+/// Names of earlier versions: subcommand, option, replacement.
 const REPLACED: [(&str, &str, &str); 2] = [
     ("estimators", "--camera", "--view X,Y,Z,YAW,PITCH"),
     ("measure", "--each", "--views"),
 ];
 
-/// Runs the subcommand that the arguments of the process name.
+/// Runs the subcommand that the process arguments name.
 ///
 /// # Errors
-/// What the subcommand says.
+/// Those of the subcommand.
 pub fn run() -> Result<ExitCode> {
     match parse::<Cli>(&REPLACED).command {
         Command::Estimators(args) => estimators::run(&args),

@@ -1,7 +1,7 @@
 //! The two commands: `relight` for users of maps, `relight-lab` for measurements of the renderer.
 //!
-//! Each subcommand is a module. Those of `relight` and what both commands share are here; those of `relight-lab` are
-//! in [`lab`]. A binary is a call of [`relight`] or [`relight_lab`]; nothing else is public.
+//! Each subcommand is a module. Subcommands of `relight`, and code of both commands, are here; subcommands of
+//! `relight-lab` are in [`lab`]. A binary calls [`relight`] or [`relight_lab`]; nothing else is public.
 
 #![forbid(unsafe_code)]
 
@@ -50,7 +50,7 @@ mod tests {
 
     use super::{command, lab};
 
-    /// Options whose description depends on the command, such as a file in one and a folder in another.
+    /// Options whose description differs between commands, such as a file in one and a folder in another.
     const DESCRIBED_APART: [&str; 7] = [
         "cache",
         "calibrate",
@@ -61,7 +61,7 @@ mod tests {
         "view",
     ];
 
-    /// How an option is written: short form, names of its values, and whether it takes any.
+    /// Syntax of an option: short form, names of its values, and whether it takes any.
     fn spelling(option: &Arg) -> String {
         let values: Vec<&str> = option
             .get_value_names()

@@ -10,20 +10,20 @@ use crate::lit_maps::LitMaps;
 
 /// Draw a map's lights from above
 ///
-/// The picture shows the clusters by how many lights they list, the lights, and where traced light differs from stored
-/// light. Without --output it is written as NAME_lights.png and NAME_lights.svg into the current folder.
+/// The picture shows the clusters by the length of their light lists, the lights, and the difference between traced and
+/// stored light. Without --output it is written as NAME_lights.png and NAME_lights.svg into the current folder.
 ///
 /// Examples: relight lights oa_dm1; relight lights kaos2 -o kaos2.svg
 #[derive(Args, Debug)]
 pub struct LightsArgs {
     #[command(flatten)]
     maps: LitMaps,
-    /// Where the picture goes, .svg or .png; may be given for both
+    /// Output file, .svg or .png; may be repeated for both
     #[arg(short, long, value_name = "PATH")]
     output: Vec<PathBuf>,
 }
 
-/// Where the pictures of a map go: where the command line says, else beside each other in the current folder.
+/// Output files for a map: those of the command line, or two files in the current folder.
 fn pictures(args: &LightsArgs, map: &str) -> Vec<PathBuf> {
     if !args.output.is_empty() {
         return args.output.clone();

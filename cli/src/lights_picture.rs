@@ -1,4 +1,4 @@
-//! A picture of a map from above: its lights, how many each cluster lists, and how well light agrees with stored light.
+//! A picture of a map from above: lights, lengths of light lists, and agreement with stored light.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -17,12 +17,12 @@ const SIDE: f32 = 1400.0;
 /// Empty pixels around the map.
 const MARGIN: f32 = 24.0;
 
-/// Error at which a place is fully red or blue, stops.
+/// Error of the full red or blue colour, stops.
 const FULL: f32 = 1.0;
 
 type Color = [u8; 3];
 
-/// What is drawn, pixels.
+/// A shape, in pixels.
 enum Shape {
     Rectangle(Vec2, Vec2, Color),
     Disc(Vec2, f32, Color),
@@ -30,10 +30,10 @@ enum Shape {
     Line(Vec2, Vec2, Color),
 }
 
-/// Draws a map's lights into files, SVG or PNG by their names.
+/// Draws a map's lights to files, SVG or PNG by extension.
 ///
 /// # Errors
-/// A name ends otherwise, the map has no leaf that can be seen, or a file cannot be written.
+/// An extension is another one, the map has no visible leaf, or a file cannot be written.
 pub fn draw(world: &RelitWorld, paths: &[PathBuf]) -> Result<()> {
     let is = |path: &Path, kind: &str| {
         path.extension()
@@ -63,7 +63,7 @@ pub fn draw(world: &RelitWorld, paths: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
-/// What the colours mean, and the figures beside the picture.
+/// The legend, with figures.
 fn legend(world: &RelitWorld, residuals: &[Residual]) -> Vec<String> {
     let mut stops: Vec<f32> = residuals
         .iter()
@@ -81,14 +81,14 @@ fn legend(world: &RelitWorld, residuals: &[Residual]) -> Vec<String> {
             world.suns.len()
         ),
         format!(
-            "clusters grey to green by listed lights: mean {:.1}, longest {}",
+            "clusters from grey to green: length of the light list, mean {:.1}, longest {}",
             world.light_lists.mean_length(),
             world.light_lists.longest()
         ),
         format!(
-            "dots: traced over stored light, red brighter, blue darker, full colour at {FULL} stop; median {median:.3}"
+            "dots: traced over stored light, red: brighter, blue: darker, full colour at {FULL} stop; median {median:.3}"
         ),
-        "outlines: shining surfaces; rings: point lights, by intensity; line in the corner: towards the sun".to_owned(),
+        "outlines: emitting surfaces; rings: point lights, by intensity; line in the corner: towards the sun".to_owned(),
     ]
 }
 
@@ -99,7 +99,7 @@ fn shapes(world: &RelitWorld, residuals: &[Residual]) -> Result<(Vec<Shape>, Vec
     let mins = leaves.iter().map(|l| flat(l.mins)).reduce(Vec2::min);
     let maxs = leaves.iter().map(|l| flat(l.maxs)).reduce(Vec2::max);
     let (Some(mins), Some(maxs)) = (mins, maxs) else {
-        bail!("{}: no leaf that can be seen", world.name);
+        bail!("{}: no visible leaf", world.name);
     };
     let scale = (SIDE - 2.0 * MARGIN) / (maxs - mins).max_element().max(1.0);
     let size = ((maxs - mins) * scale + 2.0 * MARGIN).ceil();
@@ -111,7 +111,7 @@ fn shapes(world: &RelitWorld, residuals: &[Residual]) -> Result<(Vec<Shape>, Vec
     };
     let at = |v: Vec3| place(v.x, v.y);
     let mut shapes = vec![Shape::Rectangle(Vec2::ZERO, size, [16, 16, 20])];
-    // Upper leaves over lower ones.
+    // upper leafs over lower ones
     leaves.sort_by_key(|l| l.maxs[2]);
     let longest = world.light_lists.longest().max(1) as f32;
     for leaf in leaves {
@@ -142,7 +142,7 @@ fn shapes(world: &RelitWorld, residuals: &[Residual]) -> Result<(Vec<Shape>, Vec
         shapes.extend([(a, b), (b, c), (c, a)].map(|(a, b)| Shape::Line(a, b, color)));
     }
     for light in &world.point_lights {
-        // At this distance it gives a white wall that faces it a tenth of display white.
+        // at this distance the light adds a tenth of display white to a white wall that faces it
         let reach = (light.intensity.max_element() / (0.1 * std::f32::consts::PI)).sqrt();
         let radius = (reach * scale * 0.1).clamp(2.5, 30.0);
         shapes.push(Shape::Ring(at(light.origin), radius, [255, 255, 255]));
@@ -157,7 +157,7 @@ fn shapes(world: &RelitWorld, residuals: &[Residual]) -> Result<(Vec<Shape>, Vec
     Ok((shapes, size))
 }
 
-/// The hue of a light as a colour.
+/// A light's hue as a display-encoded colour.
 fn shown(light: Vec3) -> Color {
     let whole = light.max_element().max(f32::MIN_POSITIVE);
     (light / whole)
@@ -173,7 +173,7 @@ fn svg(shapes: &[Shape], size: Vec2, legend: &[String]) -> String {
         size.x
     );
     let hex = |[r, g, b]: Color| format!("#{r:02x}{g:02x}{b:02x}");
-    // Writing to a string cannot fail.
+    // writing to a string cannot fail
     for shape in shapes {
         let _ = match *shape {
             Shape::Rectangle(a, b, color) => writeln!(

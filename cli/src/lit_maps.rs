@@ -1,4 +1,4 @@
-//! Maps in the light that a game finds in them.
+//! Loads maps with the light that the game shows them in.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use crate::game::Maps;
 use crate::scripts::load_scripts;
 use crate::view::open;
 
-// The maps of a command line, and how their light is found. (A documentation comment would replace a subcommand's own.)
+// The maps, and the options of calibration. (A documentation comment would replace the subcommand's description.)
 #[derive(Args, Debug)]
 pub struct LitMaps {
     #[command(flatten)]
@@ -18,19 +18,19 @@ pub struct LitMaps {
     /// Do not fit lights to the map's lightmaps first (the game does)
     #[arg(long)]
     no_calibration: bool,
-    /// Keep what calibration and rays find in this folder, and take it from there
+    /// Cache calibrations and swept light lists in this folder
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
 }
 
 impl LitMaps {
-    /// The folder of kept results.
+    /// The cache folder.
     pub fn cache(&self) -> Option<CalibrationCache> {
         self.cache.as_ref().map(CalibrationCache::new)
     }
 
-    /// Loads a map with measured materials and all its lights, those of its `.lights` file included; also its game path.
-    /// Prints its warnings.
+    /// Loads a map with measured materials and all its lights, those of its `.lights` file included; also returns its
+    /// game path. Prints its warnings.
     ///
     /// # Errors
     /// The map cannot be found or read.
@@ -47,7 +47,7 @@ impl LitMaps {
             ..Options::default()
         };
         let mut world = RelitWorld::load(&*files, &materials, &map, options)?;
-        // calibration has measured them
+        // calibration measures them, too
         if self.no_calibration {
             world.measure_materials(&*files);
         }

@@ -1,4 +1,4 @@
-//! `relight material`: how a material is understood.
+//! `relight material`: interpretation of a material.
 
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -15,25 +15,25 @@ use crate::game::Game;
 use crate::scripts::load_scripts;
 use crate::view::open;
 
-/// Print how a material is understood
+/// Print the interpretation of a material
 ///
-/// Where it is defined, its stages as they are drawn, what it is to light, what it emits, and every warning with the
-/// script's line. Exit code: 0, or 1 when the default is drawn instead of some material.
+/// Prints where it is defined, its stages as drawn, its class for lighting, its emission, and every warning with the
+/// script's line. Exit code: 0, or 1 if the default image replaces a material.
 ///
 /// Examples: relight material textures/gothic_light/ironcrosslt2_10000; relight material sfx/beam --json;
 /// relight material --map e1m1.bsp --game id1 textures/wizwood1_5
 #[derive(Args, Debug)]
 pub struct MaterialArgs {
-    /// Names as maps and models write them
+    /// Names of materials, as in maps and models
     #[arg(required = true, value_name = "NAME")]
     names: Vec<String>,
     #[command(flatten)]
     game: Game,
-    /// A map that uses the materials: with its flags and the way that it lights them. Of formats that have materials
-    /// of their own (Quake, Quake II) it brings these along; so does a pack
+    /// A map that uses the materials, for their flags and their lighting. Also provides the materials of formats
+    /// without scripts (Quake, Quake II), and those in its pack
     #[arg(long, value_name = "MAP")]
     map: Option<String>,
-    /// How the surface is lit that it is used on, which decides what a bare image becomes; not asked where the map tells
+    /// Lighting of the surface, which decides the stages of a bare image; ignored if --map determines it
     #[arg(long, value_enum, default_value_t = Lighting::Lightmap)]
     lighting: Lighting,
     /// Print JSON in place of text
@@ -41,18 +41,18 @@ pub struct MaterialArgs {
     json: bool,
 }
 
-/// What a surface is lit by.
+/// Lighting of a surface.
 #[derive(ValueEnum, Clone, Copy, Debug)]
 enum Lighting {
-    /// A lightmap.
+    /// By a lightmap.
     Lightmap,
-    /// Colours of its vertices.
+    /// By vertex colours.
     Vertex,
-    /// The light grid, like models.
+    /// By the light grid, like models.
     Entity,
-    /// Nothing: it is bright.
+    /// None: fullbright.
     White,
-    /// Nothing: it is part of the overlay.
+    /// None: a picture of the overlay.
     Overlay,
 }
 
@@ -68,19 +68,19 @@ impl From<Lighting> for ImplicitKind {
     }
 }
 
-/// What is told about a material.
+/// Report about a material.
 #[derive(Serialize)]
-struct Told {
-    /// Everything that its script says, and its stages as drawn.
+struct Report {
+    /// The content of its script, and its stages as drawn.
     material: Value,
-    /// What it is to light.
+    /// Its properties for lighting.
     light: Light,
     warnings: Vec<Warning>,
-    /// Its definition, line by line; empty for a bare image.
+    /// Lines of its definition; empty for a bare image.
     source: Vec<Line>,
 }
 
-/// What a material is to light.
+/// Properties of a material for lighting.
 #[derive(Serialize)]
 struct Light {
     class: String,
@@ -90,19 +90,19 @@ struct Light {
     additive: bool,
     filter: bool,
     environment: bool,
-    /// Part of light that it throws back, linear.
+    /// Albedo, linear.
     albedo: [f32; 3],
     emission: Option<Emits>,
 }
 
-/// What it emits.
+/// Emission of a material.
 #[derive(Serialize)]
 struct Emits {
     source: &'static str,
-    /// Radiance, in units of display white; of sprites radiant intensity.
+    /// Radiance relative to display white; radiant intensity for sprites.
     strength: [f32; 3],
     two_sided: bool,
-    /// Whether it changes in time.
+    /// Varies with time.
     flickers: bool,
 }
 
@@ -120,7 +120,7 @@ struct Line {
     text: String,
 }
 
-/// Prints what is known of each material.
+/// Prints the report about each material.
 pub fn run(args: &MaterialArgs) -> Result<ExitCode> {
     let (files, map): (Arc<dyn GameFiles>, _) = match &args.map {
         Some(map) => {
@@ -140,7 +140,7 @@ pub fn run(args: &MaterialArgs) -> Result<ExitCode> {
     if let Some(world) = &mut world {
         world.measure_materials(files);
     }
-    let mut told = Vec::new();
+    let mut reports = Vec::new();
     let mut faults = 0;
     for name in &args.names {
         let used = world.as_ref().map_or(Vec::new(), |w| used_in(w, name));
@@ -150,13 +150,13 @@ pub fn run(args: &MaterialArgs) -> Result<ExitCode> {
         });
         for material in used.into_iter().chain(&own) {
             faults += usize::from(material.resolved.fault.is_some());
-            told.push(Told::new(files, material, &diagnostics));
+            reports.push(Report::new(files, material, &diagnostics));
         }
     }
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&told)?);
+        println!("{}", serde_json::to_string_pretty(&reports)?);
     } else {
-        told.iter().for_each(Told::print);
+        reports.iter().for_each(Report::print);
     }
     Ok(match faults {
         0 => ExitCode::SUCCESS,
@@ -164,7 +164,7 @@ pub fn run(args: &MaterialArgs) -> Result<ExitCode> {
     })
 }
 
-/// The materials of a map that have a name, or whose picture has it: one for each set of flags and way to be lit.
+/// Materials of a map with a name, or whose image has it: one for each set of flags and kind of lighting.
 fn used_in<'a>(world: &'a RelitWorld, name: &str) -> Vec<&'a WorldMaterial> {
     let uses = world.bsp.texture_uses.iter();
     let pictured: Vec<&str> = uses
@@ -182,8 +182,8 @@ fn used_in<'a>(world: &'a RelitWorld, name: &str) -> Vec<&'a WorldMaterial> {
     world.materials.iter().filter(wanted).collect()
 }
 
-impl Told {
-    fn new(files: &dyn GameFiles, material: &WorldMaterial, all: &[Diagnostic]) -> Told {
+impl Report {
+    fn new(files: &dyn GameFiles, material: &WorldMaterial, all: &[Diagnostic]) -> Report {
         let class = &material.class;
         let about = |d: &&Diagnostic| {
             let definition = material.resolved.script.as_ref();
@@ -192,7 +192,7 @@ impl Told {
                 d.shader.as_ref().is_some_and(same)
             })
         };
-        Told {
+        Report {
             material: material_json(material),
             light: Light {
                 class: format!("{:?}", class.class),
@@ -238,7 +238,7 @@ impl Told {
             None => row("defined by", "no script; a bare image".to_owned()),
         }
         if let Some(fault) = material.get("fault") {
-            row("not drawn", format!("{}; the default is", text(fault)));
+            row("not drawn", format!("{}; default instead", text(fault)));
         }
         row("kind", self.light.words());
         let [r, g, b] = self.light.albedo;
@@ -282,15 +282,15 @@ impl Told {
             row("source", String::new());
         }
         for line in &self.source {
-            let told = self.warnings.iter().any(|w| w.line == line.number);
-            let mark = if told { '>' } else { ' ' };
+            let warned = self.warnings.iter().any(|w| w.line == line.number);
+            let mark = if warned { '>' } else { ' ' };
             println!("  {mark} {:5}  {}", line.number, line.text);
         }
     }
 }
 
 impl Light {
-    /// `opaque, both sides drawn`.
+    /// Properties as words: `opaque, both sides drawn`.
     fn words(&self) -> String {
         let mut words = vec![self.class.to_lowercase()];
         for (holds, word) in [
@@ -309,7 +309,7 @@ impl Light {
     }
 }
 
-/// The lines of a material's definition, to the brace that closes it.
+/// Lines of a material's definition, up to the closing brace.
 fn source(files: &dyn GameFiles, material: &WorldMaterial) -> Vec<Line> {
     let Some(script) = &material.resolved.script else {
         return Vec::new();
@@ -318,7 +318,7 @@ fn source(files: &dyn GameFiles, material: &WorldMaterial) -> Vec<Line> {
         return Vec::new();
     };
     let text = String::from_utf8_lossy(&bytes);
-    // As the parser counts them: CR, LF and CR LF each end a line.
+    // as in the parser, CR, LF and CR LF each end a line
     let text = text.replace("\r\n", "\n").replace('\r', "\n");
     let first = script.location.line.max(1);
     let mut depth = 0i64;

@@ -1,4 +1,4 @@
-//! Warnings of the libraries, on standard error.
+//! Prints warnings of the libraries to standard error.
 
 use std::collections::HashSet;
 use std::sync::{Mutex, PoisonError};
@@ -12,7 +12,7 @@ struct Messages {
 }
 
 impl Messages {
-    /// Whether a message is new.
+    /// Whether a message was not printed before.
     fn is_new(&self, message: &str) -> bool {
         let mut printed = self.printed.lock().unwrap_or_else(PoisonError::into_inner);
         !printed.contains(message) && printed.insert(message.to_owned())
@@ -34,7 +34,7 @@ impl Log for Messages {
     fn flush(&self) {}
 }
 
-/// Prints warnings from here on.
+/// Starts to print warnings.
 pub fn print_warnings() {
     if log::set_boxed_logger(Box::<Messages>::default()).is_ok() {
         log::set_max_level(LevelFilter::Warn);

@@ -1,23 +1,23 @@
-//! Numbers of the command line that make sense.
+//! Parsers of numbers, with their limits.
 
-/// Reads a number that `fits`; `what` says which numbers do.
+/// Parses a number that satisfies `fits`; `what` describes the accepted numbers.
 fn number(text: &str, what: &str, fits: impl Fn(f32) -> bool) -> Result<f32, String> {
     let parsed: Option<f32> = text.parse().ok();
     let fitting = parsed.filter(|n| n.is_finite() && fits(*n));
     fitting.ok_or_else(|| format!("it must be {what}"))
 }
 
-/// More than nothing.
+/// A number above 0.
 pub fn positive(text: &str) -> Result<f32, String> {
     number(text, "a number above 0", |n| n > 0.0)
 }
 
-/// Nothing or more.
+/// A number of at least 0.
 pub fn not_negative(text: &str) -> Result<f32, String> {
     number(text, "0 or a number above it", |n| n >= 0.0)
 }
 
-/// Finite numbers with commas or spaces between; `None` where something else is among them.
+/// Finite numbers with commas or spaces between; `None` if anything else is among them.
 pub fn list(text: &str) -> Option<Vec<f32>> {
     let words = text
         .split(|c: char| c == ',' || c.is_whitespace())
@@ -27,7 +27,7 @@ pub fn list(text: &str) -> Option<Vec<f32>> {
         .collect()
 }
 
-/// A horizontal field of view, degrees, that a flat picture can have.
+/// A horizontal field of view, degrees, of a plane projection.
 pub fn fov(text: &str) -> Result<f32, String> {
     number(
         text,
@@ -36,11 +36,11 @@ pub fn fov(text: &str) -> Result<f32, String> {
     )
 }
 
-/// A whole number from 1 on.
+/// A whole number of at least 1.
 pub fn count(text: &str) -> Result<usize, String> {
     let parsed: Option<usize> = text.parse().ok();
     let fitting = parsed.filter(|n| *n > 0);
-    fitting.ok_or_else(|| "it must be a whole number from 1 on".to_owned())
+    fitting.ok_or_else(|| "it must be a whole number of at least 1".to_owned())
 }
 
 #[cfg(test)]

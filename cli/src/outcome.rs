@@ -1,4 +1,4 @@
-//! How a command begins and ends: its arguments, its exit code, and the sentence about what went wrong.
+//! Arguments, exit codes and error messages of a command.
 
 use std::process::ExitCode;
 
@@ -8,13 +8,13 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 use crate::messages;
 
-/// Exit code for input that cannot be read: a file that is cut off, of another kind, or damaged.
+/// Exit code for input that cannot be read: truncated, damaged, or of another format.
 pub const BAD_INPUT: u8 = 2;
 
-/// Exit code for arguments that make no sense, clap's own.
+/// Exit code of clap for invalid arguments.
 const BAD_ARGUMENTS: i32 = 2;
 
-/// Ends quietly where whoever reads the output has had enough of it (`relight info | head`).
+/// Exits quietly when the reader closes the pipe (`relight info | head`).
 fn end_with_the_reader() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
@@ -42,9 +42,9 @@ pub fn main(run: impl Fn() -> Result<ExitCode>) -> ExitCode {
     }
 }
 
-/// The arguments of the process. Ends the process where they make no sense, and for `--help`.
+/// The process arguments. Exits on invalid arguments and for `--help`.
 ///
-/// `replaced`: subcommand, option or nothing, and what replaces it.
+/// `replaced`: subcommand, option (empty for the subcommand itself), replacement.
 pub fn parse<C: Parser>(replaced: &[(&str, &str, &str)]) -> C {
     C::try_parse().unwrap_or_else(|error| {
         let name = C::command().get_name().to_owned();
@@ -60,7 +60,7 @@ pub fn parse<C: Parser>(replaced: &[(&str, &str, &str)]) -> C {
     })
 }
 
-/// The row of `replaced` for what clap does not know. `words`: the arguments, the subcommand first.
+/// The row of `replaced` for arguments that clap rejects. `words`: the arguments, the subcommand first.
 fn replacement<'a>(
     error: &clap::Error,
     words: &[String],
@@ -76,7 +76,7 @@ fn replacement<'a>(
     found.copied()
 }
 
-/// The option that an unknown word is, or of a number the option before it: one that had several values.
+/// The option in `word`, or the option before it if `word` is a number: some options had several values.
 fn option_of<'a>(word: &'a str, words: &'a [String]) -> Option<&'a str> {
     if word.parse::<f32>().is_err() {
         return Some(word);
@@ -86,7 +86,7 @@ fn option_of<'a>(word: &'a str, words: &'a [String]) -> Option<&'a str> {
     before.rev().find(|w| w.starts_with("--"))
 }
 
-/// An error with its causes, each once: some of them repeat what caused them.
+/// An error with its causes, without repetitions.
 pub fn one_sentence(error: &anyhow::Error) -> String {
     let mut text = String::new();
     for cause in error.chain().map(ToString::to_string) {
@@ -101,7 +101,7 @@ pub fn one_sentence(error: &anyhow::Error) -> String {
     text
 }
 
-/// Whether a file was read that is not what it should be, or a map is nowhere.
+/// Whether the error is about input: an invalid file, or a missing map.
 fn is_bad_input(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause.is::<q3bsp::Error>()

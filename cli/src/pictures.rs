@@ -1,4 +1,4 @@
-//! Pictures as files that appear whole or not at all.
+//! Picture files, written atomically.
 
 use std::path::{Path, PathBuf};
 
@@ -6,10 +6,10 @@ use anyhow::{Context, Result};
 use image::ImageEncoder;
 use relight::compare::Rgb8;
 
-/// Writes a file beside its place first, so that nobody sees half of one.
+/// Writes a file atomically: to a temporary file beside it, which is then renamed.
 ///
 /// # Errors
-/// It cannot be written; nothing is left behind.
+/// The file cannot be written; the temporary file is removed.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut half = path.as_os_str().to_owned();
     half.push(".part");
@@ -25,7 +25,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
 /// Writes a PNG of 8 bits a channel, rows from the top.
 ///
 /// # Errors
-/// It cannot be written, or there are not three bytes a pixel.
+/// The file cannot be written, or `rgb` does not have three bytes a pixel.
 pub fn write_png(path: &Path, rgb: &[u8], width: u32, height: u32) -> Result<()> {
     let mut bytes = Vec::new();
     let encoder = image::codecs::png::PngEncoder::new(&mut bytes);
@@ -33,10 +33,10 @@ pub fn write_png(path: &Path, rgb: &[u8], width: u32, height: u32) -> Result<()>
     write_whole(path, &bytes)
 }
 
-/// Reads a picture file of any kind that the game knows, by its extension; alpha is dropped.
+/// Reads an image in a format of the game, by extension; drops alpha.
 ///
 /// # Errors
-/// It cannot be read, or is no picture.
+/// The file cannot be read or is no image.
 pub fn read(path: &Path) -> Result<Rgb8> {
     let file = path.display().to_string();
     let extension = path
@@ -59,7 +59,7 @@ pub fn read(path: &Path) -> Result<Rgb8> {
 /// Writes a picture as PNG.
 ///
 /// # Errors
-/// It cannot be written, or is too large for a file.
+/// The file cannot be written, or the picture is too large.
 pub fn write(path: &Path, picture: &Rgb8) -> Result<()> {
     let (width, height) = (
         u32::try_from(picture.width())?,

@@ -1,4 +1,4 @@
-//! `relight render`: a picture of a map, without an engine and without a display.
+//! `relight render`: pictures of a map, without engine and display.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,7 +18,7 @@ use renderer_vk::api::RefDef;
 use renderer_vk::path::{self, PathPoint};
 use renderer_vk::{LightSelection, Renderer, RendererOptions, Settings};
 
-/// How the picture is made.
+/// Look of the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Look {
     /// As the engine's own renderer draws it.
@@ -27,12 +27,12 @@ pub enum Look {
     Traced,
 }
 
-/// How traced light chooses lights.
+/// Light sampling of the traced look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Sampling {
-    /// One light of the cluster's list, all with the same probability.
+    /// One light of the cluster's list, each with equal probability.
     Uniform,
-    /// One light by resampled importance.
+    /// One light, by resampled importance sampling.
     Resampled,
     /// Every light of the list.
     All,
@@ -40,7 +40,7 @@ pub enum Sampling {
 
 /// Make a picture of a map, or a series of pictures, without an engine or a display
 ///
-/// A picture appears whole or not at all. Exit code: 0, or 2 when the map cannot be read, or 1 for everything else.
+/// Files are written atomically. Exit code: 0, 2 if the map cannot be read, or 1 for other errors.
 ///
 /// Examples: relight render oa_dm1 -o oa_dm1.png; relight render my.bsp --spawn 2 --look classic -o spawn.png;
 /// relight render oa_dm1 --view 100,-50,80,90,10 --spp 256 --size 640x480 -o view.png;
@@ -55,37 +55,37 @@ pub struct RenderArgs {
     sample: bool,
     #[command(flatten)]
     game: Game,
-    /// Where the picture goes (PNG)
+    /// Output file (PNG)
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
-    /// How the picture is made; default: traced, and classic with --overview
+    /// Look of the picture; default: traced, and classic with --overview
     #[arg(long, value_enum)]
     look: Option<Look>,
     /// Size in pixels
     #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1280x720", value_parser = parse_size)]
     size: (u32, u32),
-    /// Where to look from, units and degrees: x,y,z, and yaw and pitch (down) where they are not 0; default: the map's
+    /// Camera: position in units, yaw and pitch (down) in degrees, which may be left out; default: the map's
     /// intermission or first spawn point
     #[arg(long, value_parser = parse_view, allow_hyphen_values = true, value_name = "X,Y,Z,YAW,PITCH")]
     view: Option<Camera>,
-    /// Look from a place where players appear, counted from 0 in the map's order
+    /// View from a spawn point, counted from 0 in the map's order
     #[arg(long, value_name = "N", conflicts_with = "view")]
     spawn: Option<usize>,
-    /// Look at the whole map from above one of its corners; classic where the look is not said. Traced, from the first
-    /// place on the way there that is inside, under the sky
+    /// View of the whole map from above one of its corners; classic by default. The traced look moves the camera
+    /// forward to the first position inside the map, below the sky
     #[arg(long, conflicts_with_all = ["view", "spawn"])]
     overview: bool,
     /// Horizontal field of view, degrees, from 1 to 170
     #[arg(long, default_value_t = 90.0, value_parser = numbers::fov)]
     fov: f32,
-    /// Frames that are drawn for a picture, each with a sample a pixel: 64 by default. The classic look draws more than one
-    /// only with --timings or --stats
+    /// Frames a picture, each with one sample a pixel; default 64. The classic look draws one, but for --timings and
+    /// --stats
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
-    /// Pictures of a --path, evenly along it; each is drawn --spp times
+    /// Pictures of a --path, evenly along it; each has --spp frames
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
-    /// How traced light chooses lights
+    /// Light sampling of the traced look
     #[arg(long, value_enum, default_value = "resampled")]
     sampling: Sampling,
     #[arg(long, help = help("rt_candidates"), value_parser = value_of("rt_candidates"), default_value = default("rt_candidates"))]
@@ -102,27 +102,27 @@ pub struct RenderArgs {
     /// Vulkan device: part of its name
     #[arg(long, value_name = "NAME")]
     device: Option<String>,
-    /// Switch Vulkan's validation layer on; any message is an error
+    /// Enable Vulkan's validation layer; any message is an error
     #[arg(long)]
     validate: bool,
-    /// Print milliseconds as JSON: of the GPU for each pass (the mean over the frames), and of GPU and CPU for a frame
+    /// Print milliseconds as JSON: of the GPU for each pass (mean over the frames), and of GPU and CPU for a frame
     #[arg(long)]
     timings: bool,
-    /// Print what the last frames cost as JSON: milliseconds, rays and millions of rays a second of each pass, and bytes
-    /// of GPU memory by purpose
+    /// Print the cost of the last frames as JSON: milliseconds, rays and millions of rays a second for each pass, and
+    /// GPU memory by purpose
     #[arg(long)]
     stats: bool,
-    /// Camera path, a frame a line, as the console command rt_path records it: a series of pictures with --frames;
-    /// without, its frames are drawn one after the other, as a game would, and the last is the picture
+    /// Camera path, a frame a line, as the console command rt_path records it: with --frames a series of pictures;
+    /// without, its frames are drawn in succession, as in a game, and the last one is the picture
     #[arg(long, value_name = "FILE", conflicts_with_all = ["view", "spawn", "overview", "turn"])]
     path: Option<PathBuf>,
-    /// Turn the camera once round over the frames, so that they show different things
+    /// Turn the camera by a full turn over the frames, so that they differ
     #[arg(long)]
     turn: bool,
-    /// Draw frames as a game shows them: nothing accumulates
+    /// Draw frames as the game does, without accumulation
     #[arg(long)]
     no_accumulation: bool,
-    /// Move the camera by this much from frame to frame, so that the last frame is where it was asked for
+    /// Move the camera by this much from frame to frame; the last frame is at the requested view
     #[arg(long, value_parser = parse_step, allow_hyphen_values = true, value_name = "X,Y,Z,YAW")]
     step: Option<[f32; 4]>,
     #[arg(long, help = help("rt_debug"), value_parser = value_of("rt_debug"), default_value = default("rt_debug"))]
@@ -134,14 +134,14 @@ pub struct RenderArgs {
     no_taa: bool,
     #[arg(long, help = help("rt_scale"), value_parser = value_of("rt_scale"), default_value = default("rt_scale"))]
     render_scale: Assignment,
-    /// Depth of field: diameter of the lens and distance that is sharp, units
+    /// Depth of field: diameter of the lens and focus distance, units
     #[arg(long, value_parser = parse_lens, value_name = "DIAMETER,DISTANCE")]
     lens: Option<[f32; 2]>,
     #[command(flatten)]
     set: SettingArgs,
 }
 
-/// `WIDTHxHEIGHT`.
+/// Parses `WIDTHxHEIGHT`.
 pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let parsed = text
         .split_once('x')
@@ -152,7 +152,7 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
-/// The frames of a camera path.
+/// Reads a camera path.
 fn read_path(file: &Path) -> anyhow::Result<Vec<PathPoint>> {
     let text = std::fs::read_to_string(file)
         .with_context(|| format!("{}: cannot be read", file.display()))?;
@@ -163,7 +163,7 @@ fn read_path(file: &Path) -> anyhow::Result<Vec<PathPoint>> {
     Ok(points)
 }
 
-/// `X,Y,Z[,YAW[,PITCH]]`, or with spaces between.
+/// Parses `X,Y,Z[,YAW[,PITCH]]`; spaces may replace commas.
 pub fn parse_view(text: &str) -> Result<Camera, String> {
     match numbers::list(text).as_deref() {
         Some([x, y, z, rest @ ..]) if rest.len() <= 2 => Ok(Camera {
@@ -175,20 +175,20 @@ pub fn parse_view(text: &str) -> Result<Camera, String> {
     }
 }
 
-/// `X,Y,Z,YAW`.
+/// Parses `X,Y,Z,YAW`.
 fn parse_step(text: &str) -> Result<[f32; 4], String> {
     let step = numbers::list(text).and_then(|step| step.try_into().ok());
     step.ok_or_else(|| "a step is X,Y,Z,YAW, for example 4,0,0,-1".to_owned())
 }
 
-/// `DIAMETER,DISTANCE`.
+/// Parses `DIAMETER,DISTANCE`.
 fn parse_lens(text: &str) -> Result<[f32; 2], String> {
     let lens = numbers::list(text).and_then(|lens| lens.try_into().ok());
     lens.filter(|lens: &[f32; 2]| lens.iter().all(|n| *n > 0.0))
         .ok_or_else(|| "a lens is DIAMETER,DISTANCE, numbers above 0, for example 4,200".to_owned())
 }
 
-/// The frame that is drawn: where of what, and whether a picture is written after it.
+/// A frame: its view, and the file of the picture after it, if any.
 struct Shot {
     def: RefDef,
     written: Option<PathBuf>,
@@ -242,10 +242,10 @@ impl RenderArgs {
         }
         if self.overview {
             let camera = Camera::overview(world, self.size, self.fov)
-                .context("the map has nothing that is drawn")?;
+                .context("the map has no triangles to draw")?;
             return Ok(match self.look() {
                 Look::Classic => camera,
-                // From outside, rays see the sky's other side and no map.
+                // from outside, rays hit the back of the sky instead of the map
                 Look::Traced => camera.moved_inside(bsp),
             });
         }
@@ -255,14 +255,14 @@ impl RenderArgs {
                 .get(number)
                 .copied()
                 .with_context(|| match spawns.len() {
-                    0 => format!("no spawn point {number}: players cannot appear in this map"),
+                    0 => format!("no spawn point {number}: the map has none"),
                     count => format!("no spawn point {number}: the map has 0 to {}", count - 1),
                 });
         }
-        Camera::of_map(bsp).context("the map has no place to look from; give one with --view")
+        Camera::of_map(bsp).context("the map has no place for a camera; set one with --view")
     }
 
-    /// Frames for one picture.
+    /// Number of frames of a picture.
     fn samples(&self) -> u32 {
         match self.look() {
             Look::Traced => self.spp.unwrap_or(64),
@@ -271,7 +271,7 @@ impl RenderArgs {
         }
     }
 
-    /// All frames of the command, in order.
+    /// All frames, in order.
     fn shots(&self, camera: Camera) -> anyhow::Result<Vec<Shot>> {
         let (width, height) = self.size;
         let last = |mut shots: Vec<Shot>| {
@@ -334,9 +334,9 @@ impl RenderArgs {
         Ok(last((0..frames).map(frame).collect()))
     }
 
-    /// Name of a picture of a series: the output's with its number.
+    /// File of a picture of a series: the output's name with its number.
     fn numbered(&self, number: usize) -> PathBuf {
-        // A path that ends in `..` has no name; writing to it fails.
+        // a path that ends in `..` has no name; writing to it fails
         let stem = self.output.file_stem().unwrap_or_default();
         let name = format!("{}_{number:04}.png", stem.to_string_lossy());
         self.output.with_file_name(name)
@@ -354,7 +354,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     }
     if args.frames.is_some() && args.path.is_none() {
         bail!(
-            "--frames is the number of pictures of a --path; --spp is that of frames drawn for one picture"
+            "--frames is the number of pictures of a --path; --spp is the number of frames drawn for one picture"
         );
     }
     let (files, map) = if args.sample {
@@ -387,8 +387,8 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     bar.set_message(format!("{map} on {}", info.name));
     let mut timings = Timings::default();
     renderer.count_rays(args.stats);
-    // JSON has standard output for itself
-    let told = args.stats || args.timings;
+    // standard output has the JSON only
+    let json = args.stats || args.timings;
     for Shot { def, written } in &shots {
         renderer.begin_frame(def.time_ms);
         renderer.clear_scene();
@@ -401,7 +401,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         if let Some(path) = written {
             let picture = renderer.read_pixels()?;
             write_png(path, &picture.rgb, picture.width, picture.height)?;
-            if told {
+            if json {
                 eprintln!("{}", path.display());
             } else {
                 bar.suspend(|| println!("{}", path.display()));

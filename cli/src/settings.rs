@@ -1,10 +1,10 @@
-//! Options that set the renderer's settings: their parsers, defaults and help are those of the table of settings.
+//! Options for settings of the renderer; their parsers, defaults and help come from the table of settings.
 
 use clap::Args;
 use renderer_vk::Settings;
 use renderer_vk::settings::{Given, Row, SettingError, row};
 
-/// A value of a setting.
+/// A setting with a value.
 #[derive(Clone, Debug)]
 pub struct Assignment {
     row: &'static Row,
@@ -19,7 +19,7 @@ impl Assignment {
     }
 }
 
-/// The row of a setting that an option names.
+/// The row of the setting of an option.
 fn named(name: &str) -> &'static Row {
     row(name).expect("options name settings of the table")
 }
@@ -41,7 +41,7 @@ pub fn default(name: &str) -> &'static str {
     named(name).spec.default
 }
 
-/// `NAME=VALUE`.
+/// Parses `NAME=VALUE`.
 fn assignment(text: &str) -> Result<Assignment, String> {
     let (name, value) = text
         .split_once('=')
@@ -55,14 +55,13 @@ fn assignment(text: &str) -> Result<Assignment, String> {
 // Settings of the renderer.
 #[derive(Args, Debug)]
 pub struct SettingArgs {
-    /// Set a setting by its name in the console (docs/settings.md), for example --set rt_maxDepth=2; may be given several
-    /// times
+    /// Set a setting by its console name (docs/settings.md), for example --set rt_maxDepth=2; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<Assignment>,
 }
 
 impl SettingArgs {
-    /// Changes settings by options and then by `--set`.
+    /// Applies the options, then `--set`.
     pub fn change<'a>(
         &'a self,
         options: impl IntoIterator<Item = &'a Assignment>,

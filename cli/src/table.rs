@@ -1,4 +1,4 @@
-//! Many pictures compared: one folder with another, picture by picture, as a table.
+//! Compares folders of pictures, as a table.
 
 use std::path::{Path, PathBuf};
 
@@ -7,10 +7,10 @@ use relight::compare::{Rgb8, compare, flip};
 
 use crate::pictures::{read, write};
 
-/// How much brighter differences are shown.
+/// Factor of displayed differences.
 const GAIN: u8 = 4;
 
-/// One picture against its reference.
+/// A picture against its reference.
 #[derive(Clone, Copy)]
 struct Likeness {
     ssim: f64,
@@ -18,12 +18,12 @@ struct Likeness {
     differing: f64,
 }
 
-/// Compares the pictures in the first of `folders`, and those of the same names in the others, with `reference` and
-/// prints a table, tabs between columns. The `worst` pictures of the first folder that are least alike are written to
-/// `to`: reference, ours, and their difference.
+/// Compares the pictures of the first of `folders`, and those of the same names in the others, with `reference`, and
+/// prints a table with tabs between columns. Writes the `worst` least similar pictures of the first folder to `to`:
+/// reference, picture, and difference.
 ///
 /// # Errors
-/// A folder or a picture cannot be read, a picture is missing or of another size, there are none.
+/// A folder or a picture cannot be read, a picture is missing or of another size, or the folders are empty.
 pub fn folders(
     reference: &Path,
     folders: &[PathBuf],

@@ -1,4 +1,4 @@
-//! What frames cost: `relight render --timings`.
+//! Cost of frames: `relight render --timings`.
 
 use renderer_vk::FrameStats;
 use serde_json::{Map, Value, json};
@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 /// Times of many frames, milliseconds.
 #[derive(Default)]
 pub struct Timings {
-    /// Name, sum and number of each pass of the GPU, in order of recording.
+    /// Name, sum and number of each GPU pass, in order of recording.
     passes: Vec<(String, f32, u32)>,
     gpu: Vec<f32>,
     cpu: Vec<f32>,
@@ -17,7 +17,7 @@ pub struct Timings {
 }
 
 impl Timings {
-    /// Adds a frame: the passes of the newest one that the GPU finished, and the CPU's part of this one.
+    /// Adds a frame: the passes of the newest frame that the GPU finished, and the CPU time of this one.
     pub fn add(&mut self, passes: &[(String, f32)], stats: &FrameStats) {
         for (name, ms) in passes {
             match self.passes.iter_mut().find(|(n, ..)| n == name) {
@@ -29,7 +29,7 @@ impl Timings {
             self.gpu.push(passes.iter().map(|(_, ms)| ms).sum());
         }
         let cpu = &stats.cpu;
-        // waiting for the GPU is no work
+        // without the wait for the GPU
         self.cpu.push(cpu.gather + cpu.record + cpu.submit);
         self.gather.push(cpu.gather);
         self.record.push(cpu.record);
@@ -37,8 +37,8 @@ impl Timings {
         self.draws = self.draws.max(stats.draws);
     }
 
-    /// `ms`: the mean of each pass; `gpu_ms` and `cpu_ms`: median and worst of the frames' sums, for the CPU with the
-    /// medians of its parts; `draws`: the most draw calls of a frame.
+    /// `ms`: mean of each pass; `gpu_ms` and `cpu_ms`: median and maximum of the frames' sums, for the CPU with the
+    /// medians of its parts; `draws`: largest number of draw calls in a frame.
     pub fn report(&self) -> Map<String, Value> {
         let passes: Map<_, _> = self
             .passes
@@ -63,7 +63,7 @@ impl Timings {
     }
 }
 
-/// The value in the middle; 0 of nothing.
+/// The median; 0 for no values.
 fn median(values: &[f32]) -> f32 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f32::total_cmp);

@@ -1,4 +1,4 @@
-//! Maps that are opened, and places to look at them from.
+//! Opens maps, and finds cameras in them.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,13 +13,13 @@ use relight::{GameFiles, LoadError, MemoryFiles, Overlay, Pk3, RelitWorld, Searc
 use renderer_vk::api::{EntityKind, RefDef, RefEntity};
 use renderer_vk::{Renderer, Settings};
 
-/// Where the game's files and the map come from.
+/// Opens a map with its game files; also returns its game path.
 ///
-/// `map`: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp or .pk3 file, or pack.pk3:maps/x.bsp. With a .bsp file come the lights and
-/// lightmaps beside it, if there are any.
+/// `map`: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp or .pk3 file, or pack.pk3:maps/x.bsp. Includes lights and lightmaps
+/// beside a .bsp file.
 ///
 /// # Errors
-/// A folder or the file cannot be read, or a pack has not exactly one map.
+/// A folder or the file cannot be read, or a pack has no map or several.
 pub fn open(map: &str, game: &Game) -> anyhow::Result<(Arc<dyn GameFiles>, String)> {
     let mut path = game.files()?;
     let map = map.to_owned();
@@ -47,7 +47,7 @@ pub fn open(map: &str, game: &Game) -> anyhow::Result<(Arc<dyn GameFiles>, Strin
             let stem = file.file_stem().and_then(|s| s.to_str()).unwrap_or("map");
             let name = format!("maps/{stem}.bsp");
             let bytes = std::fs::read(&file).with_context(|| format!("{map}: cannot be read"))?;
-            // said now, while the file's own name is known
+            // checked here, so that an error names the file
             Bsp::parse(&bytes).with_context(|| map.clone())?;
             let mut front = beside(&file)?;
             front.insert(&name, bytes)?;
@@ -60,13 +60,13 @@ pub fn open(map: &str, game: &Game) -> anyhow::Result<(Arc<dyn GameFiles>, Strin
     Ok((with_map_files(path, MemoryFiles::new(), &name)?, name))
 }
 
-/// The name of a map for files and tables, without its folders: `path` is what [`open`] returned.
+/// Name of a map for files and tables, without folders. `path`: from [`open`].
 pub fn map_name(path: &str) -> &str {
     let name = path.rsplit(['/', '\\']).next().unwrap_or(path);
     name.strip_suffix(".bsp").unwrap_or(name)
 }
 
-/// Says that a pack has no maps where a game reads them, where it has some, and what to do.
+/// Message for a pack without maps in the game's folder: their place, if there are any, and the remedy.
 pub fn no_maps(name: &str, pack: &Pk3) -> String {
     let is_map = |path: &String| path.to_ascii_lowercase().ends_with(".bsp");
     let Some(found) = pack.all_names().find(is_map) else {
@@ -84,7 +84,7 @@ pub fn no_maps(name: &str, pack: &Pk3) -> String {
     }
 }
 
-/// The game's files with `front` before them, and what the map brings along where its format has no scripts.
+/// The game's files behind `front`, and those in the map itself if its format has no scripts.
 fn with_map_files(
     back: SearchPath,
     front: MemoryFiles,
@@ -111,12 +111,12 @@ fn with_map_files(
 /// Yaw and pitch of an overview, degrees.
 const OVERVIEW: (f32, f32) = (45.0, 50.0);
 
-/// A place to look from.
+/// A camera.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Camera {
-    /// Units.
+    /// Position, units.
     pub origin: Vec3,
-    /// Degrees, from east to north.
+    /// Degrees, counter-clockwise from +x.
     pub yaw: f32,
     /// Degrees, down.
     pub pitch: f32,
@@ -138,7 +138,7 @@ impl From<Viewpoint> for Camera {
 }
 
 impl Camera {
-    /// Forward, left, up.
+    /// Axes: forward, left, up.
     pub fn axis(&self) -> [Vec3; 3] {
         let (sy, cy) = self.yaw.to_radians().sin_cos();
         let (sp, cp) = self.pitch.to_radians().sin_cos();
@@ -149,7 +149,7 @@ impl Camera {
         ]
     }
 
-    /// The view of a picture of `size` pixels; `fov`: horizontal, degrees.
+    /// The view for a picture of `size` pixels; `fov`: horizontal, degrees.
     pub fn ref_def(&self, size: (u32, u32), fov: f32) -> RefDef {
         let (width, height) = size;
         let fov = fov.clamp(1.0, 170.0);
@@ -165,7 +165,7 @@ impl Camera {
         }
     }
 
-    /// The intermission's view, or that of the first spawn point.
+    /// The intermission's camera, or that of the first spawn point.
     pub fn of_map(bsp: &Bsp) -> Option<Self> {
         let entities = bsp.entities();
         let view = viewpoints::intermission(&entities);
@@ -173,14 +173,14 @@ impl Camera {
             .map(Self::from)
     }
 
-    /// What players see where they appear, in the order of the map.
+    /// The cameras of the spawn points, in the map's order.
     pub fn spawns(bsp: &Bsp) -> Vec<Self> {
         viewpoints::spawn_views(&bsp.entities())
             .map(Self::from)
             .collect()
     }
 
-    /// The whole map from above one of its corners; `None` where nothing is drawn.
+    /// A view of the whole map from above one of its corners; `None` if the map has no triangles.
     pub fn overview(world: &RelitWorld, size: (u32, u32), fov: f32) -> Option<Self> {
         let sky = |material: u32| {
             let material = world.materials.get(material as usize);
@@ -205,7 +205,7 @@ impl Camera {
             yaw: OVERVIEW.0,
             pitch: OVERVIEW.1,
         };
-        // As far back as the corner needs that is furthest out of the picture.
+        // as far back as the outermost corner requires
         let [forward, left, up] = camera.axis();
         let def = camera.ref_def(size, fov);
         let across = (def.fov_x.to_radians() * 0.5).tan();
@@ -219,7 +219,7 @@ impl Camera {
         Some(camera)
     }
 
-    /// The first place on the way forward that is inside of the map; this one where there is none.
+    /// The first position along the view direction inside the map; otherwise this camera.
     pub fn moved_inside(self, bsp: &Bsp) -> Self {
         const STEP: f32 = 16.0;
         const STEPS: u16 = 8192;
@@ -233,7 +233,8 @@ impl Camera {
     }
 }
 
-/// Has a renderer load a map, as a game does; the map's data, and [what the game would add](map_entities) to every view.
+/// Loads a map into a renderer, as a game does; returns the map's data, and [the entities](map_entities) for every
+/// view.
 ///
 /// # Errors
 /// The map cannot be read, or the device is out of memory.
@@ -252,7 +253,7 @@ pub fn load(
     Ok((bsp, entities))
 }
 
-/// What the game would add to every view: the map's inline models at rest, and the marks of its mirrors.
+/// Entities that the game would add to every view: the map's inline models at rest, and the marks of its mirrors.
 fn map_entities(renderer: &mut Renderer, bsp: &Bsp) -> Vec<RefEntity> {
     let mut entities = Vec::new();
     let axis = [Vec3::X, Vec3::Y, Vec3::Z];
@@ -272,7 +273,7 @@ fn map_entities(renderer: &mut Renderer, bsp: &Bsp) -> Vec<RefEntity> {
             }
             _ => {}
         }
-        // without a target it is a mirror; a camera portal needs the game to turn and move its camera
+        // without a target it marks a mirror; a portal would need the game to move its camera
         if entity.classname() == "misc_portal_surface" && entity.get("target").is_none() {
             entities.push(RefEntity {
                 kind: EntityKind::PortalSurface,

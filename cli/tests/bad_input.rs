@@ -1,4 +1,4 @@
-//! Files that are no maps, or damaged ones: one sentence that says where, exit code 2, nothing written.
+//! Files that are no maps, or damaged ones: one sentence with the place, exit code 2, nothing written.
 
 mod common;
 
@@ -8,7 +8,7 @@ use std::process::Command;
 use testkit::Random;
 
 /// Every command that reads maps, on one file: the code, and the one line about it.
-fn told(bytes: &[u8]) -> String {
+fn printed(bytes: &[u8]) -> String {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("bad.bsp"), bytes).unwrap();
     let mut lines = Vec::new();
@@ -38,14 +38,14 @@ fn a_map_that_is_cut_off_names_lump_and_offset() {
         let whole = map(format);
         let bsp = Bsp::parse(&whole).unwrap();
         let vertices = bsp.container.lumps[Lump::DrawVerts.index()];
-        let cut = told(&whole[..vertices.offset as usize + 10]);
+        let cut = printed(&whole[..vertices.offset as usize + 10]);
         assert!(
             cut.contains("offset") && cut.contains("outside the file of"),
             "{cut}"
         );
     }
-    assert!(told(&map(Format::Ibsp46)[..50]).contains("50 bytes"));
-    assert!(told(b"").contains("0 bytes"));
+    assert!(printed(&map(Format::Ibsp46)[..50]).contains("50 bytes"));
+    assert!(printed(b"").contains("0 bytes"));
 }
 
 #[test]
@@ -54,7 +54,7 @@ fn a_wrong_reference_names_lump_and_offset() {
     let bsp = Bsp::parse(&bytes).unwrap();
     let at = bsp.container.lumps[Lump::Surfaces.index()].offset as usize + 148;
     bytes[at..at + 4].copy_from_slice(&999i32.to_le_bytes());
-    let text = told(&bytes);
+    let text = printed(&bytes);
     assert!(
         text.contains("lump surfaces, element 1: shaderNum is 999"),
         "{text}"
@@ -72,10 +72,10 @@ fn foreign_and_random_files_are_told() {
         (b"PK\x03\x04 and so on", "zip"),
         (b"\x89PNG\r\n\x1a\n", "unknown"),
     ] {
-        let text = told(bytes);
+        let text = printed(bytes);
         assert!(text.contains(part), "{part}: {text}");
     }
-    told(&Random::new(1).bytes(5000));
+    printed(&Random::new(1).bytes(5000));
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn maps_become_json_and_map_files() {
     }
 }
 
-/// What a program says about a command that it refuses, in a folder without anything.
+/// Messages of a program about a command that it refuses, in an empty folder.
 fn refused(program: &str, arguments: &[&str]) -> String {
     let folder = tempfile::tempdir().unwrap();
     let output = run(program, folder.path(), arguments);
@@ -105,7 +105,7 @@ fn refused(program: &str, arguments: &[&str]) -> String {
 fn numbers_that_make_no_sense_are_refused() {
     const RENDER: &[&str] = &["render", "m", "-o", "out.png"];
     const CONVERT: &[&str] = &["convert", "m", "-o", "out.glb"];
-    for (command, option, number, told) in [
+    for (command, option, number, printed) in [
         (RENDER, "--fov", "0", "from 1 to 170 degrees"),
         (RENDER, "--fov", "180", "from 1 to 170 degrees"),
         (RENDER, "--fov", "NaN", "from 1 to 170 degrees"),
@@ -131,38 +131,44 @@ fn numbers_that_make_no_sense_are_refused() {
         (CONVERT, "--scale", "0", "above 0"),
         (CONVERT, "--light-scale", "inf", "above 0"),
         (CONVERT, "--subdivisions", "NaN", "above 0"),
-        (&["cameras"], "--every", "0", "from 1 on"),
-        (&["cameras"], "--views", "0", "from 1 on"),
+        (&["cameras"], "--every", "0", "of at least 1"),
+        (&["cameras"], "--views", "0", "of at least 1"),
         (RENDER, "--view", "0,0,NaN,0", "X,Y,Z,YAW,PITCH"),
         (RENDER, "--step", "0,0,inf,0", "X,Y,Z,YAW"),
         (RENDER, "--step", "1,2,3", "X,Y,Z,YAW"),
         (RENDER, "--lens", "NaN,100", "numbers above 0"),
         (RENDER, "--lens", "4,0", "numbers above 0"),
     ] {
-        refused_option(env!("CARGO_BIN_EXE_relight"), command, option, number, told);
+        refused_option(
+            env!("CARGO_BIN_EXE_relight"),
+            command,
+            option,
+            number,
+            printed,
+        );
     }
-    for (command, option, number, told) in [
+    for (command, option, number, printed) in [
         ("measure", "--fov", "180", "from 1 to 170 degrees"),
         ("measure", "--frames", "1", "1 is not in 2.."),
-        ("measure", "--views", "0", "from 1 on"),
+        ("measure", "--views", "0", "of at least 1"),
         ("estimators", "--candidates", "0", "from 1 to 64"),
         ("estimators", "--view", "0,0", "X,Y,Z,YAW,PITCH"),
         ("light-lists", "--rays", "0", "0 is not in 1.."),
-        ("light-lists", "--clusters", "0", "from 1 on"),
-        ("looks", "--views", "0", "from 1 on"),
+        ("light-lists", "--clusters", "0", "of at least 1"),
+        ("looks", "--views", "0", "of at least 1"),
         ("looks", "--frames", "0", "0 is not in 1.."),
     ] {
         let lab = env!("CARGO_BIN_EXE_relight-lab");
-        refused_option(lab, &[command, "m"], option, number, told);
+        refused_option(lab, &[command, "m"], option, number, printed);
     }
 }
 
 /// Checks that a program refuses a value of an option, by the option's name and with what it takes.
-fn refused_option(program: &str, command: &[&str], option: &str, value: &str, told: &str) {
+fn refused_option(program: &str, command: &[&str], option: &str, value: &str, printed: &str) {
     let arguments = [command, &[option, value]].concat();
     let text = refused(program, &arguments);
     assert!(
-        text.contains(option) && text.contains(told),
+        text.contains(option) && text.contains(printed),
         "{arguments:?}: {text}"
     );
 }
@@ -187,7 +193,7 @@ fn a_pack_with_everything_below_one_folder_names_the_folder() {
         &["info", "PACK"],
         &["render", "PACK", "-o", "out.png"],
     ] {
-        let told = |pack: &str| {
+        let printed = |pack: &str| {
             let words = command.iter().map(|w| if *w == "PACK" { pack } else { w });
             let output = Command::new(env!("CARGO_BIN_EXE_relight"))
                 .current_dir(folder.path())
@@ -198,14 +204,14 @@ fn a_pack_with_everything_below_one_folder_names_the_folder() {
             assert!(!output.status.success(), "{command:?}: {output:?}");
             String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned()
         };
-        let deep = told("deep.pk3");
+        let deep = printed("deep.pk3");
         let named = deep.contains("below the folder MyMap (MyMap/Maps/x.bsp)");
         assert!(
             named && deep.contains("pack what is inside of MyMap"),
             "{deep}"
         );
-        let flat = told("flat.pk3");
+        let flat = printed("flat.pk3");
         assert!(flat.contains("x.bsp is in no folder maps"), "{flat}");
-        assert!(told("none.pk3").contains("no maps in it"));
+        assert!(printed("none.pk3").contains("no maps in it"));
     }
 }

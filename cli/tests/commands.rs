@@ -46,7 +46,7 @@ fn help_lists_the_commands_of_users_and_those_of_the_lab_apart() {
 fn replaced_spellings_are_refused_with_the_new_one() {
     const RENDER: [&str; 4] = ["render", "m", "-o", "m.png"];
     let render = |option: &[&'static str]| [&RENDER, option].concat();
-    for (program, arguments, told) in [
+    for (program, arguments, printed) in [
         (
             RELIGHT,
             render(&["--classic"]),
@@ -126,13 +126,13 @@ fn replaced_spellings_are_refused_with_the_new_one() {
         let refused = output(program, &arguments);
         assert_eq!(refused.status.code(), Some(2), "{arguments:?}: {refused:?}");
         let text = String::from_utf8(refused.stderr).unwrap();
-        assert_eq!(text, format!("error: {told}\n"), "{arguments:?}");
+        assert_eq!(text, format!("error: {printed}\n"), "{arguments:?}");
     }
 }
 
 #[test]
 fn what_was_never_there_is_refused_by_its_name() {
-    for (arguments, told) in [
+    for (arguments, printed) in [
         (
             &["render", "m", "-o", "m.png", "--nothing"][..],
             "'--nothing'",
@@ -149,6 +149,6 @@ fn what_was_never_there_is_refused_by_its_name() {
         let refused = output(RELIGHT, arguments);
         assert!(!refused.status.success(), "{arguments:?}: {refused:?}");
         let text = String::from_utf8(refused.stderr).unwrap();
-        assert!(text.contains(told) && !text.contains("is now"), "{text}");
+        assert!(text.contains(printed) && !text.contains("is now"), "{text}");
     }
 }

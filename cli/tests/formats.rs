@@ -67,22 +67,22 @@ fn every_command_takes_every_format() {
             "Quake2" => Some(("textures/e1/sky", 4)),
             _ => None,
         } {
-            // No script says what the map does.
+            // No script defines the map's materials.
             let output = relight(
                 folder.path(),
                 &["material", "--map", "m.bsp", sky, "--json"],
             );
-            let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-            let found = told[0]["material"]["surfaceFlags"].as_u64().unwrap();
-            assert_eq!(found & 4, flags, "{name}: {told}");
+            let printed: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+            let found = printed[0]["material"]["surfaceFlags"].as_u64().unwrap();
+            assert_eq!(found & 4, flags, "{name}: {printed}");
         }
         if name == "Quake" {
             let of_map = ["material", "--map", "m.bsp", "textures/*lava1", "--json"];
             let output = relight(folder.path(), &of_map);
             assert!(output.status.success(), "{output:?}");
-            let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-            let stage = &told[0]["material"]["stages"][1];
-            assert_eq!(stage["map"], "textures/*lava1", "{told}");
+            let printed: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+            let stage = &printed[0]["material"]["stages"][1];
+            assert_eq!(stage["map"], "textures/*lava1", "{printed}");
             let alone = relight(folder.path(), &["material", "textures/*lava1"]);
             assert_eq!(alone.status.code(), Some(1), "{alone:?}");
         }
@@ -90,10 +90,10 @@ fn every_command_takes_every_format() {
             folder.path(),
             &["convert", "m.bsp", "-o", "m.glb", "--json"],
         );
-        let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let printed: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         // the rooms of Quake's formats have a window to the sky
         let quake = room::FORMATS.iter().any(|f| format!("{f:?}") == name);
         let triangles = if quake { 10 } else { 12 };
-        assert_eq!(told["converted"][0]["triangles"], triangles, "{name}");
+        assert_eq!(printed["converted"][0]["triangles"], triangles, "{name}");
     }
 }

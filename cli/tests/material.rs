@@ -98,7 +98,7 @@ fn a_fault_of_a_whole_script_is_told_with_its_place_and_its_remedy() {
     let script = "t/lamp\n{\n\t{\n\t\tmap $whiteimage\n\t}\n}\n/* lamps:\nt/lost\n{\n}\n";
     std::fs::write(folder.path().join("scripts/a.shader"), script).unwrap();
     std::fs::write(folder.path().join("scripts/b.shader"), "t/open\n{\n").unwrap();
-    let told = |command: &str, name: &str| {
+    let printed = |command: &str, name: &str| {
         let output = Command::new(env!("CARGO_BIN_EXE_relight"))
             .args([command, name, "--game"])
             .arg(folder.path())
@@ -106,7 +106,7 @@ fn a_fault_of_a_whole_script_is_told_with_its_place_and_its_remedy() {
             .unwrap();
         String::from_utf8(output.stderr).unwrap()
     };
-    for text in [told("material", "t/lamp"), told("info", "nowhere")] {
+    for text in [printed("material", "t/lamp"), printed("info", "nowhere")] {
         let place = "scripts/a.shader:7:1: warning: this comment is never closed";
         assert!(text.contains(place) && text.contains("put */"), "{text}");
         assert!(text.contains("scripts/b.shader:1:1: error"), "{text}");

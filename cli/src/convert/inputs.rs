@@ -1,4 +1,4 @@
-//! Which maps are converted, and where to.
+//! Input maps of a conversion, and output files.
 
 use std::collections::HashSet;
 use std::fmt;
@@ -14,11 +14,11 @@ use crate::beside::beside;
 
 /// A map.
 pub enum Input {
-    /// By its path in the game's files.
+    /// By a path in the game's files.
     Game(String),
-    /// In a file of its own.
+    /// A file.
     File(PathBuf),
-    /// In a pack.
+    /// A map in a pack.
     Packed(Arc<Pk3>, String),
 }
 
@@ -33,7 +33,7 @@ impl fmt::Display for Input {
 }
 
 impl Input {
-    /// The map's file.
+    /// Reads the map's file.
     pub fn read(&self, files: &SearchPath) -> Result<Vec<u8>> {
         let found = match self {
             Input::File(path) => {
@@ -45,10 +45,10 @@ impl Input {
         found.with_context(|| format!("{self}: no such map"))
     }
 
-    /// The game's files, with what lies beside the map's own file before them.
+    /// The game's files, preceded by those beside the map's own file.
     ///
     /// # Errors
-    /// A file beside it is there and cannot be read.
+    /// A file beside it cannot be read.
     pub fn files<'a>(&self, game: &'a SearchPath) -> Result<Overlay<&'a SearchPath>> {
         let front = match self {
             Input::File(path) => beside(path)?,
@@ -57,7 +57,7 @@ impl Input {
         Ok(Overlay { front, back: game })
     }
 
-    /// Path that the map has in its game, or would have.
+    /// Game path of the map, existing or not.
     pub fn game_path(&self) -> String {
         match self {
             Input::File(_) => format!("maps/{}.bsp", self.name()),
@@ -65,7 +65,7 @@ impl Input {
         }
     }
 
-    /// Name of the map: that of its file without folders and extension.
+    /// Name of the map: its file name without extension.
     fn name(&self) -> String {
         let path = match self {
             Input::File(path) => path,
@@ -86,8 +86,7 @@ impl Input {
     }
 }
 
-/// The maps that the command line asks for. Packs that are in none of the game's folders are searched for images and
-/// scripts as well, above the game.
+/// The maps of the command line. Packs outside of the game's folders are added to `files`, above the game.
 pub fn find(files: &mut SearchPath, games: &[PathBuf], asked: &[String]) -> Result<Vec<Input>> {
     let mut inputs = Vec::new();
     let mut packs: Vec<(String, Arc<Pk3>)> = Vec::new();
@@ -139,7 +138,7 @@ pub fn find(files: &mut SearchPath, games: &[PathBuf], asked: &[String]) -> Resu
     Ok(inputs)
 }
 
-/// `pack.pk3:maps/x.bsp`, told apart.
+/// Splits `pack.pk3:maps/x.bsp`.
 fn split_packed(name: &str) -> Option<(&str, &str)> {
     let at = name.to_ascii_lowercase().find(".pk3:")?;
     Some((name.get(..at + 4)?, name.get(at + 5..)?))
@@ -151,8 +150,8 @@ fn is_in(path: &Path, folder: &Path) -> bool {
     parent.is_some() && parent == real(folder)
 }
 
-/// Where each map goes. One map goes to `output` itself, unless that is a folder or has no extension of the format;
-/// several go into it, those of several packs into a folder for each pack.
+/// Output of each map. One map is written to `output` itself, unless that is a folder or lacks the format's extension;
+/// several maps are written into it, those of several packs into a folder for each pack.
 pub fn outputs(inputs: &[Input], output: &Path, format: Format) -> Result<Vec<PathBuf>> {
     let extension = format.extension();
     let is_file = output

@@ -1,4 +1,4 @@
-//! What is told about a map.
+//! Description of a map.
 
 use std::collections::BTreeMap;
 
@@ -6,36 +6,36 @@ use q3bsp::{Bsp, LumpEntry, SurfaceKind, lightmap_index};
 use relight::{CalibrationReport, RelitWorld};
 use serde::Serialize;
 
-/// What is told about a map.
+/// Description of a map, for output as a table or as JSON.
 #[derive(Serialize)]
 pub struct MapInfo {
     pub map: String,
     pub format: &'static str,
-    /// Size of the file.
+    /// Size of the file, bytes.
     pub bytes: usize,
     pub lumps: Vec<LumpInfo>,
-    /// Corners of what is drawn, id units; absent when nothing is.
+    /// Bounds of the drawn triangles, id units; absent without triangles.
     pub bounds: Option<[[f32; 3]; 2]>,
     pub surfaces: usize,
-    /// Surfaces by what they are made of.
+    /// Number of surfaces of each kind.
     pub surfaces_by_kind: BTreeMap<&'static str, usize>,
     pub triangles: usize,
     pub models: usize,
     pub brushes: usize,
     pub entities: usize,
-    /// Entities by class.
+    /// Number of entities of each class.
     pub entities_by_class: BTreeMap<String, usize>,
     pub materials: usize,
-    /// Materials without script and image, or that the engine rejects: drawn with the default.
+    /// Materials without script and image, or that the engine rejects; drawn as the default image.
     pub missing: Vec<String>,
     pub lightmaps: Lightmaps,
     pub light_grid: Option<LightGrid>,
     pub fogs: Vec<Fog>,
     pub clusters: usize,
-    /// How many clusters a cluster sees, itself included; absent when everything sees everything.
+    /// Number of clusters visible from a cluster, itself included; absent without visibility data.
     pub clusters_seen: Option<Seen>,
     pub triangle_lights: usize,
-    /// Triangle lights by the evidence for them.
+    /// Number of triangle lights by source.
     pub lights_by_source: BTreeMap<&'static str, usize>,
     pub point_lights: usize,
     pub suns: usize,
@@ -44,7 +44,7 @@ pub struct MapInfo {
     pub longest_list: usize,
     pub degenerate_triangles: usize,
     pub emitters: Vec<Emitter>,
-    /// Light against the map's lightmaps; absent unless asked for.
+    /// Agreement with the map's lightmaps; absent unless requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration: Option<Calibration>,
     pub warnings: Vec<String>,
@@ -57,24 +57,24 @@ pub struct LumpInfo {
     pub name: &'static str,
     pub offset: i32,
     pub bytes: i32,
-    /// Number of records; absent for text, pictures and compressed data.
+    /// Number of records; absent for text, images and compressed data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub records: Option<usize>,
 }
 
-/// The lightmaps, and how surfaces are lit.
+/// The lightmaps, and the light sources of surfaces.
 #[derive(Serialize)]
 pub struct Lightmaps {
     pub pages: usize,
-    /// Texels per side of a page.
+    /// Texels along a side of a page.
     pub size: usize,
-    /// Whether they lie beside the map instead of in it.
+    /// The pages are files beside the map.
     pub beside: bool,
     pub surfaces_with_page: usize,
     pub surfaces_by_vertex: usize,
-    /// Neither: bright, or lit like entities.
+    /// Surfaces with neither: fullbright, or lit like entities.
     pub surfaces_without: usize,
-    /// Light styles beside the constant one.
+    /// Light styles besides the constant one.
     pub styles: Vec<u8>,
 }
 
@@ -83,7 +83,7 @@ pub struct Lightmaps {
 pub struct LightGrid {
     pub counts: [usize; 3],
     pub spacing: [f32; 3],
-    /// Points inside walls.
+    /// Number of points inside walls.
     pub dark: usize,
 }
 
@@ -94,11 +94,11 @@ pub struct Fog {
     pub mins: [f32; 3],
     pub maxs: [f32; 3],
     pub color: [f32; 3],
-    /// Distance at which it hides everything, id units.
+    /// Distance at which the fog is opaque, id units.
     pub depth: f32,
 }
 
-/// How many clusters can be seen.
+/// Number of visible clusters.
 #[derive(Serialize)]
 pub struct Seen {
     pub mean: f64,
@@ -107,10 +107,10 @@ pub struct Seen {
     pub most: usize,
 }
 
-/// How well light agrees with the map's lightmaps, over measurements that fitting did not see.
+/// Agreement with the map's lightmaps, at samples held out of the fit.
 #[derive(Serialize)]
 pub struct Calibration {
-    /// What told of light.
+    /// Kind of stored light.
     pub evidence: &'static str,
     pub samples: usize,
     pub held_out: usize,
@@ -122,7 +122,7 @@ pub struct Calibration {
     pub seconds: f64,
 }
 
-/// Computed light against stored light.
+/// Traced light against stored light.
 #[derive(Serialize)]
 pub struct Agreement {
     pub median_stops: f32,
@@ -162,7 +162,7 @@ pub struct Emitter {
     pub area: f64,
 }
 
-/// What surfaces are made of, in words.
+/// Name of a kind of surface.
 fn kind_name(kind: SurfaceKind) -> &'static str {
     match kind {
         SurfaceKind::Planar => "planar",
@@ -175,7 +175,7 @@ fn kind_name(kind: SurfaceKind) -> &'static str {
 }
 
 impl MapInfo {
-    /// Describes a loaded map, whose file has so many bytes and these lumps.
+    /// Describes a loaded map; `bytes`: size of its file.
     pub fn new(
         world: &RelitWorld,
         bytes: usize,
@@ -253,12 +253,12 @@ impl MapInfo {
     }
 }
 
-/// Bounds of the triangles drawn, brush models where they stand at start.
+/// Bounds of the drawn triangles, with brush models at their initial positions.
 fn bounds(world: &RelitWorld) -> Option<[[f32; 3]; 2]> {
     let drawn = world.surfaces.iter().filter(|s| s.num_indices > 0);
     let boxes = drawn.map(|s| {
         let origin = world.models.get(s.model as usize).map(|m| m.origin);
-        // Every surface belongs to a model of the map.
+        // every surface belongs to a model of the map
         let origin = origin.unwrap_or_default();
         (s.mins + origin, s.maxs + origin)
     });

@@ -1,10 +1,10 @@
-//! Maps described for people.
+//! Descriptions of maps as text.
 
 use std::fmt::Display;
 
 use super::describe::{Calibration, Emitter, MapInfo};
 
-/// One map in full.
+/// Prints one map in full.
 pub fn print_map(info: &MapInfo, emitters: bool) {
     let row = |name: &str, text: String| println!("{name:12} {text}");
     println!("{}", info.map);
@@ -56,7 +56,7 @@ pub fn print_map(info: &MapInfo, emitters: bool) {
     }
     let seen = info.clusters_seen.as_ref().map(|seen| {
         format!(
-            "each sees {:.1} in the mean ({:.0} %), {} in the median, {} to {}",
+            "visible from each: mean {:.1} ({:.0} %), median {}, {} to {}",
             seen.mean,
             100.0 * seen.mean / info.clusters.max(1) as f64,
             seen.median,
@@ -64,7 +64,7 @@ pub fn print_map(info: &MapInfo, emitters: bool) {
             seen.most
         )
     });
-    let seen = seen.unwrap_or_else(|| "everything sees everything".to_owned());
+    let seen = seen.unwrap_or_else(|| "no visibility data".to_owned());
     row("clusters", format!("{}; {seen}", info.clusters));
     let sources = match counts(info.lights_by_source.iter()) {
         list if list.is_empty() => list,
@@ -151,8 +151,8 @@ fn vector(v: [f32; 3]) -> String {
 
 fn calibration_line(c: &Calibration) -> String {
     format!(
-        "{}: {} samples ({} held out), {} known sources, {} lights placed; stops off in the median {:.3} -> {:.3}, \
-         in the worst tenth {:.3} -> {:.3}; sum {:.3} -> {:.3} of stored; {:.2} s{}",
+        "{}: {} samples ({} held out), {} known sources, {} lights placed; median error {:.3} -> {:.3} stops, \
+         worst tenth {:.3} -> {:.3}; sum over stored {:.3} -> {:.3}; {:.2} s{}",
         c.evidence,
         c.samples,
         c.held_out,
@@ -177,7 +177,7 @@ fn print_emitter(e: &Emitter) {
     );
 }
 
-/// A line for each map.
+/// Prints a line for each map.
 pub fn print_table(infos: &[MapInfo], emitters: bool) {
     let width = infos.iter().map(|i| i.map.len()).max().unwrap_or(0).max(3);
     println!(

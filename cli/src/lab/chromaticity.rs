@@ -1,7 +1,7 @@
-//! How far the colours of two pictures of the same view lie apart, whatever their brightness.
+//! Difference in chromaticity of two pictures of the same view.
 //!
-//! Pictures are compared block by block in linear light, so that neither noise nor texture matters; colour is CIE 1976
-//! chromaticity (u', v'), in which equal distances look about equally different: 0.004 is just seen beside each other.
+//! Compares means of blocks in linear light, so that noise and texture have no effect. Chromaticity is CIE 1976 (u',
+//! v'), in which equal distances look about equally different: 0.004 is just noticeable side by side.
 //!
 //! Source: CIE 15, *Colorimetry*, section 8.1 (u'v'); IEC 61966-2-1 for sRGB's primaries and curve.
 
@@ -12,7 +12,7 @@ use relight::overbright::{byte_table, colour_to_linear};
 /// Side of a block, pixels.
 const BLOCK: usize = 8;
 
-/// Luminance below which a block has no colour that could be seen.
+/// Luminance below which a block has no visible colour.
 const DARK: f64 = 0.004;
 
 /// Linear sRGB to CIE XYZ, by columns.
@@ -20,7 +20,7 @@ const TO_XYZ: Mat3 = Mat3::from_cols_array(&[
     0.4124, 0.2126, 0.0193, 0.3576, 0.7152, 0.1192, 0.1805, 0.0722, 0.9505,
 ]);
 
-/// Sums over blocks of the difference in colour of pictures beside reference ones.
+/// Sums over blocks of the chromaticity difference between pictures and references.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ColorDifference {
     blocks: usize,
@@ -30,7 +30,7 @@ pub struct ColorDifference {
 }
 
 impl ColorDifference {
-    /// Counts the blocks of two pictures of one size that are dark in neither.
+    /// Adds the blocks that are dark in neither picture. Both have one size.
     pub fn add(&mut self, picture: &Rgb8, reference: &Rgb8) {
         let white = chromaticity(colour_to_linear(Vec3::ONE));
         for (a, b) in blocks(picture).into_iter().zip(blocks(reference)) {
@@ -59,13 +59,13 @@ impl ColorDifference {
         self.distance / self.blocks.max(1) as f64
     }
 
-    /// Mean distance from white over that of the reference: below 1 the pictures are paler.
+    /// Mean distance from white over that of the reference; below 1 the pictures are less saturated.
     pub fn saturation(&self) -> f64 {
         self.saturation / self.saturation_of_reference.max(1e-9)
     }
 }
 
-/// Means of a picture's blocks in linear light; incomplete ones at its edges are left out.
+/// Means of a picture's blocks in linear light, without incomplete blocks at its edges.
 fn blocks(picture: &Rgb8) -> Vec<Vec3> {
     let table = byte_table();
     let decode = |byte: u8| table.get(usize::from(byte)).copied().unwrap_or(0.0);
@@ -89,7 +89,7 @@ fn blocks(picture: &Rgb8) -> Vec<Vec3> {
         .collect()
 }
 
-/// CIE 1976 (u', v') of a linear colour; that of black is (0, 0).
+/// CIE 1976 (u', v') of a linear colour; (0, 0) for black.
 fn chromaticity(linear: Vec3) -> Vec2 {
     let [x, y, z] = (TO_XYZ * linear).to_array();
     let sum = x + 15.0 * y + 3.0 * z;
@@ -117,7 +117,7 @@ mod tests {
         let mut paler = ColorDifference::default();
         paler.add(&even([200, 150, 150]), &even([200, 100, 100]));
         assert!(paler.mean() > 0.02 && paler.saturation() < 0.7, "{paler:?}");
-        // Red's place in the diagram, from the standard.
+        // chromaticity of sRGB's red, from the standard
         let red = chromaticity(Vec3::X);
         assert!(red.distance(Vec2::new(0.4507, 0.5229)) < 1e-3, "{red}");
         let mut dark = ColorDifference::default();

@@ -1,4 +1,4 @@
-//! `relight-lab estimators`: whether every way to choose lights comes to the same picture, and how noisy each one is.
+//! `relight-lab estimators`: bias and noise of the ways to sample lights.
 
 use anyhow::{Context, Result};
 use clap::Args;
@@ -12,18 +12,18 @@ use crate::render::{parse_size, parse_view};
 use crate::settings::{Assignment, SettingArgs, default, help, value_of};
 use crate::view::{Camera, load, open};
 
-/// Compare the ways to choose lights: all of them have the same mean
+/// Compare the ways to sample lights: all have the same mean
 ///
-/// Renders a view with every light of the list for each point (the reference), with one light chosen uniformly, with
-/// one chosen by importance, and with every light of the map; then prints for each the relative difference of the whole
-/// picture and of the worst square of 16 x 16 pixels from the reference, how many standard errors these are (noise
-/// stays below 4 or 5, bias grows with the frames), and the noise of the first frame, of 16 and of all: the mean squared
-/// error over the squared mean of the picture, times the frames, which would be one number if frames were independent
-/// (that of all frames has the reference's own noise in it). JSON has beside it the mean over the pixels of the squared
-/// error over the squared pixel (a bright pixel counts for no more than a dark one; up to a hundredth of the picture's
-/// mean). A square darker than a hundredth of the picture is measured against that. With --tiles each estimator's
-/// noisiest squares follow: where, how bright beside the picture, the difference and the standard error of its mean.
-/// Noise after more frames can be told from these: the standard error falls at least with the root of the frames.
+/// Renders a view with every light of the list (the reference), with one light chosen uniformly, with one chosen by
+/// importance, and with every light of the map. Prints for each the relative difference of the whole picture, and of
+/// the worst tile of 16 x 16 pixels, from the reference, in percent and in standard errors (noise stays below 4 or 5,
+/// bias grows with the frames), and the noise of the first frame, of 16 and of all: the mean squared error over the
+/// squared mean of the picture, times the frames. Frames that are independent have the same noise; that of all frames
+/// includes the noise of the reference. JSON also has the mean over the pixels of the squared error over the squared
+/// pixel, where pixels below a hundredth of the picture's mean count as that. A tile darker than a hundredth of the
+/// picture is measured against that. --tiles adds the noisiest tiles of each estimator: position, relative brightness,
+/// difference and standard error of its mean. These predict the noise after more frames: the standard error falls at
+/// least with the square root of the frames.
 ///
 /// Example: relight-lab estimators oa_dm1 --frames 4096 --size 512x384
 #[derive(Args, Debug)]
@@ -43,13 +43,13 @@ pub struct EstimatorsArgs {
     bounces: Assignment,
     #[arg(long, help = help("rt_candidates"), value_parser = value_of("rt_candidates"), default_value = default("rt_candidates"))]
     candidates: Assignment,
-    /// Leave out the pictures lit by every light of the map
+    /// Omit the pictures lit by every light of the map
     #[arg(long)]
     no_unculled: bool,
-    /// Print the noisiest squares of each estimator, so many
+    /// Print this number of the noisiest tiles of each estimator
     #[arg(long, default_value_t = 0)]
     tiles: usize,
-    /// Where to look from, units and degrees: x,y,z, and yaw and pitch (down) where they are not 0; default: the map's
+    /// Camera: position in units, yaw and pitch (down) in degrees, which may be left out; default: the map's
     /// intermission or first spawn point
     #[arg(long, value_parser = parse_view, allow_hyphen_values = true, value_name = "X,Y,Z,YAW,PITCH")]
     view: Option<Camera>,
@@ -63,23 +63,23 @@ pub struct EstimatorsArgs {
     set: SettingArgs,
 }
 
-/// Side of the squares that are compared.
+/// Side of a tile, pixels.
 const TILE: usize = 16;
 
-/// Frames after which the noise is taken, beside all of them.
+/// Numbers of frames at which noise is measured, besides all frames.
 const NOISE_FRAMES: [u32; 2] = [1, 16];
 
 /// A picture: linear RGB.
 type Picture = Vec<[f32; 3]>;
 
-/// What an estimator made.
+/// Result of an estimator.
 struct Rendered {
     /// Mean of all frames.
     mean: Picture,
     frames: u32,
     /// Means of the first frames, with their number.
     early: Vec<(u32, Picture)>,
-    /// Median milliseconds of the pass for direct light.
+    /// Median time of the pass for direct light, milliseconds.
     time: f32,
 }
 
@@ -91,7 +91,7 @@ struct Stage {
 }
 
 impl Stage {
-    /// The mean of `frames` frames, that of the first few, and the median milliseconds of the pass for direct light.
+    /// Renders `frames` frames: their mean, those of the first ones, and the median time of the pass for direct light.
     fn render(&mut self, name: &str, settings: &Settings, frames: u32) -> Result<Rendered> {
         let bar = ProgressBar::new(frames.into());
         bar.set_style(ProgressStyle::with_template(
@@ -133,7 +133,7 @@ fn level(p: &[f32; 3]) -> f64 {
     f64::from(p[0] + p[1] + p[2]) / 3.0
 }
 
-/// A part of a picture beside the same part of its reference.
+/// A part of a picture against the same part of its reference.
 struct Score {
     /// Its first pixel.
     at: (usize, usize),
@@ -141,18 +141,18 @@ struct Score {
     brightness: f64,
     /// Relative difference of the mean.
     difference: f64,
-    /// Standard error of that, from the differences of the pixels.
+    /// Standard error of the difference.
     error: f64,
 }
 
 impl Score {
-    /// `mean`: of the reference's whole picture; what is darker than a hundredth of that is measured against it.
+    /// `mean`: of the reference's whole picture; parts darker than a hundredth of it are measured against that.
     fn new<'a>(
         at: (usize, usize),
         pixels: impl Iterator<Item = (&'a [f32; 3], &'a [f32; 3])>,
         mean: f64,
     ) -> Self {
-        // pixels are independent, so the squares of their differences tell the standard error of the sum
+        // pixels are independent, so the variance of the sum is estimated by the sum of their squared differences
         let (mut sum, mut squares, mut light, mut count) = (0.0, 0.0, 0.0, 0.0f64);
         for (a, b) in pixels {
             let d = level(a) - level(b);
@@ -189,7 +189,7 @@ impl Score {
     }
 }
 
-/// Relative difference of the picture and of its squares, with the noisiest `noisiest` of these.
+/// Relative differences of the picture and of its tiles, with the `noisiest` noisiest tiles.
 fn compare(picture: &Picture, truth: &Picture, width: usize, noisiest: usize) -> Value {
     let mean = truth.iter().map(level).sum::<f64>() / truth.len().max(1) as f64;
     let all = Score::new((0, 0), picture.iter().zip(truth), mean);
@@ -221,7 +221,7 @@ fn compare(picture: &Picture, truth: &Picture, width: usize, noisiest: usize) ->
     line
 }
 
-/// Mean squared error over the squared mean of the picture, times the frames that the picture is the mean of.
+/// Mean squared error over the squared mean of the picture, times the number of frames in the picture.
 fn noise(early: &Picture, truth: &Picture, frames: u32) -> f64 {
     let mean = truth.iter().map(level).sum::<f64>() / truth.len().max(1) as f64;
     let squares = early
@@ -242,7 +242,7 @@ fn relative_noise(early: &Picture, truth: &Picture, frames: u32) -> f64 {
     squares.sum::<f64>() / count * f64::from(frames)
 }
 
-/// Prints what JSON says of an estimator as a row of a table.
+/// Prints an estimator's JSON as a row of a table.
 fn row(line: &Value) {
     let number = |key: &str| line.get(key).and_then(Value::as_f64).unwrap_or(0.0);
     let noise = |path: &str| line.pointer(path).and_then(Value::as_f64).unwrap_or(0.0);
@@ -286,7 +286,7 @@ pub fn run(args: &EstimatorsArgs) -> Result<()> {
             rt: true,
             rt_accumulate: true,
             rt_auto_exposure: false,
-            // what differs is to be the light alone
+            // only light sampling may cause differences
             rt_antialiasing: false,
             rt_num_random_dl: 1,
             ..Settings::full_size()
@@ -300,7 +300,7 @@ pub fn run(args: &EstimatorsArgs) -> Result<()> {
         .context("no picture without a Vulkan device")?;
         let (bsp, entities) = load(&mut renderer, files, &map, &base)?;
         let camera = (args.view.or_else(|| Camera::of_map(&bsp)))
-            .context("the map has no place to look from; give one with --view")?;
+            .context("the map has no place for a camera; set one with --view")?;
         let mut stage = Stage {
             renderer,
             entities,
@@ -393,7 +393,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_noisiest_tiles_are_told_with_their_standard_error() {
+    fn the_noisiest_tiles_are_listed_with_their_standard_error() {
         // four tiles; one is off up and down by a tenth, a darker one by a fifth up
         let (width, height) = (2 * TILE, 2 * TILE);
         let pixel = |i: usize| (i % width / TILE, i / width / TILE);
@@ -408,17 +408,17 @@ mod tests {
         let picture: Picture = (truth.iter().enumerate())
             .map(|(i, p)| p.map(|level| off(i, level)))
             .collect();
-        let told = compare(&picture, &truth, width, 2);
-        let tiles = told["noisiest_tiles"].as_array().unwrap();
+        let report = compare(&picture, &truth, width, 2);
+        let tiles = report["noisiest_tiles"].as_array().unwrap();
         assert_eq!(tiles.len(), 2);
         let near = |path: &str, expected: f64| {
-            let found = told.pointer(path).and_then(Value::as_f64).unwrap();
+            let found = report.pointer(path).and_then(Value::as_f64).unwrap();
             assert!((found - expected).abs() < 1.0e-5, "{path}: {found}");
         };
         assert_eq!(tiles[0]["at"], json!([0, TILE]));
         near("/noisiest_tiles/0/brightness", 0.5 / 0.875);
         near("/noisiest_tiles/0/difference", 0.2);
-        // the root of 256 squares over 256 pixels
+        // the square root of 256 squares over 256 pixels
         near("/noisiest_tiles/0/standard_error", 0.2 / 16.0);
         assert_eq!(tiles[1]["at"], json!([TILE, 0]));
         near("/noisiest_tiles/1/difference", 0.0);

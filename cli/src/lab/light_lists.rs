@@ -1,4 +1,4 @@
-//! `relight-lab light-lists`: how good maps' light lists are, judged by rays.
+//! `relight-lab light-lists`: quality of maps' light lists, measured by rays.
 
 use std::time::Instant;
 
@@ -11,16 +11,15 @@ use serde_json::json;
 
 use crate::lit_maps::LitMaps;
 
-/// Judge maps' light lists by rays, and print JSON: one object a map and kind of list
+/// Measure the quality of maps' light lists by rays, and print JSON: one object a map and kind of list
 ///
-/// A pair of a light and a visibility cluster is visible when a ray from some point of the cluster to some
-/// point of the light arrives: when it meets no opaque triangle, nor runs through the solid of the map (pairs that are
-/// visible through the solid alone, where nothing is drawn on a wall, are counted apart). Prints for lists from the
-/// potentially visible sets alone, with geometry, and swept by rays: recall (visible pairs that are listed, of all visible
-/// ones, and of those that give more than a fifth of a percent of their cluster's light: the bound below which lights are
-/// left out), precision (visible pairs, of those listed) and its ratio to that of the potentially visible sets, the part of
-/// all arriving light that lights give which are not listed, the largest such part of a cluster, and the lists' lengths.
-/// The rays are others than those that the lists were swept with.
+/// A pair of a light and a cluster is visible if a ray from a point of the cluster to a point of the light hits no
+/// opaque triangle and crosses no solid of the map (pairs visible only through a solid without drawn walls are counted
+/// separately). Prints for lists from the potentially visible sets alone, with geometry, and swept by rays: recall
+/// (listed pairs among the visible ones; also among those with more than a fifth of a percent of their cluster's light,
+/// the bound below which lights are omitted), precision (visible pairs among the listed ones) and its ratio to that of
+/// the potentially visible sets, the share of arriving light from unlisted lights, the largest such share of a cluster,
+/// and the lengths of the lists. The rays differ from those of the sweep.
 ///
 /// Example: relight-lab light-lists oa_dm1 kaos2 --rays 256
 #[derive(Args, Debug)]
@@ -30,7 +29,7 @@ pub struct LightListsArgs {
     /// Rays for a pair of light and cluster
     #[arg(long, default_value_t = 128, value_parser = clap::value_parser!(u32).range(1..))]
     rays: u32,
-    /// Clusters that are judged; they are spread evenly over the map's list
+    /// Number of clusters to measure, spread evenly over the map's list
     #[arg(long, default_value_t = 64, value_parser = crate::numbers::count)]
     clusters: usize,
 }

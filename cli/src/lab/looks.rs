@@ -1,4 +1,5 @@
-//! `relight-lab looks`: one view in the classic look and traced, with lights as directives say and calibrated, side by side.
+//! `relight-lab looks`: views in the classic and the traced look, with lights by directives and calibrated, side by
+//! side.
 
 use std::path::PathBuf;
 
@@ -18,9 +19,9 @@ use crate::render::parse_size;
 use crate::settings::SettingArgs;
 use crate::view::{Camera, load, map_name, open};
 
-/// Draw views in the classic look and traced, side by side, and compare how bright and how coloured they are
+/// Draw views in the classic and the traced look, side by side, and compare their brightness and colour
 ///
-/// Views are the camera of the intermission and spawn points. Prints for each map, with lights as directives say and
+/// Views are the camera of the intermission and spawn points. Prints for each map, with lights by directives and
 /// calibrated: the mean luminance of the traced pictures over that of the classic ones; the mean distance of their
 /// colours in CIE 1976 (u', v'), times 1000; and their mean saturation over that of the classic ones.
 ///
@@ -38,16 +39,16 @@ pub struct LooksArgs {
     /// Frames accumulated for a traced picture
     #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..))]
     frames: u32,
-    /// Draw frames as a game shows them: nothing accumulates
+    /// Draw frames as the game does, without accumulation
     #[arg(long)]
     no_accumulation: bool,
-    /// Leave automatic exposure out
+    /// Disable automatic exposure
     #[arg(long)]
     fixed_exposure: bool,
     /// Folder for pictures: classic, traced by directives, traced calibrated, from left to right
     #[arg(short, long, value_name = "PATH")]
     output: Option<PathBuf>,
-    /// Keep what calibration finds in this folder, and take it from there
+    /// Cache calibrations in this folder
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
     /// Vulkan device: part of its name
@@ -115,7 +116,7 @@ struct Sums {
     views: usize,
     /// Mean luminances of the pictures in each look.
     luminance: [f64; 3],
-    /// Colours of the traced looks beside the classic one.
+    /// Chromaticity of the traced looks against the classic look.
     color: [ColorDifference; 2],
 }
 
@@ -130,7 +131,7 @@ impl Sums {
         }
     }
 
-    /// Luminance by prior and calibrated, over that of the classic look.
+    /// Luminance by directives and calibrated, over that of the classic look.
     fn brightness(&self) -> [f64; 2] {
         let [classic, prior, calibrated] = self.luminance;
         [prior, calibrated].map(|sum| sum / classic.max(1e-9))
@@ -261,7 +262,7 @@ fn save(file: &std::path::Path, pictures: &[Rgb8], (width, height): (u32, u32)) 
         for picture in pictures {
             let bytes = width as usize * 3;
             let row = picture.pixels().get(row * bytes..(row + 1) * bytes);
-            // All pictures of a map have one size.
+            // all pictures of a map have one size
             rows.extend_from_slice(row.unwrap_or_default());
         }
     }

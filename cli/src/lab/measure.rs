@@ -1,12 +1,13 @@
-//! `relight-lab measure`: how near the traced look comes in real time to its own reference, without an engine or a display.
+//! `relight-lab measure`: error of the traced look in real time against its own reference, without an engine or a
+//! display.
 //!
-//! Truth is the mean of many frames with all the sampling switched to its unbiased form (`rt_accumulate`). Every picture
-//! has the exposure that the map starts with, so that differences are those of the light. Cameras follow from the map
-//! by the rule of `relight cameras`, or are named.
+//! The reference is the mean of many frames with all sampling in its unbiased form (`rt_accumulate`). Every picture has
+//! the map's initial exposure, so that differences are those of light. Cameras are those of `relight cameras`, or
+//! given.
 //!
-//! How alike pictures are is told of all pixels, and apart for those that show something by way of a mirror, a portal, glass, a
-//! liquid or a shiny surface (`rt_debug 11`) and those that show it directly. Light is compared before it is displayed: what
-//! is clipped at white or rounded to black has another mean.
+//! Similarity is measured over all pixels, and separately for those with specular paths (mirror, portal, glass, liquid
+//! or shiny surface; `rt_debug 11`) and for the others. Light is compared before display: clipping at white and
+//! rounding to black change means.
 
 mod region;
 mod stage;
@@ -36,9 +37,9 @@ use crate::view::{Camera, load, map_name, open};
 
 /// Measure the traced look in real time against its reference
 ///
-/// For each place: similarity of what a player sees after a short turn of the head (raw, denoised, denoised and
-/// antialiased, and a baseline with uniform light selection and a denoiser without gradients), noise over time of a
-/// resting view, frames until a light that was switched off is gone, and what a moving light leaves behind.
+/// For each place: similarity of the picture after a short turn of the camera (raw, denoised, denoised and antialiased,
+/// and a baseline with uniform light selection and a denoiser without gradients), noise over time at rest, frames until
+/// a light that was switched off has disappeared, and the trail of a moving light.
 ///
 /// Example: relight-lab measure oa_dm1 kaos2 --reference 4096 -o out/measure
 #[derive(Args, Debug)]
@@ -48,23 +49,23 @@ pub struct MeasureArgs {
     /// Views of each map: the camera of the intermission first, then spawn points, evenly out of the map's list
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = numbers::count)]
     views: usize,
-    /// Where to look from, units and degrees: x,y,z, and yaw and pitch (down) where they are not 0; may be given more than
-    /// once; default: the views that --views counts
+    /// Camera: position in units, yaw and pitch (down) in degrees, which may be left out; may be repeated; default: the
+    /// views that --views counts
     #[arg(long, value_name = "X,Y,Z,YAW,PITCH", value_parser = parse_view, allow_hyphen_values = true)]
     view: Vec<Camera>,
-    /// A model in the hands: its file in the game's data
+    /// A first-person model: its file in the game's data
     #[arg(long, value_name = "MODEL")]
     hold: Option<String>,
     /// Horizontal field of view, degrees, from 1 to 170
     #[arg(long, default_value_t = 90.0, value_parser = numbers::fov)]
     fov: f32,
-    /// Stand still where the camera would turn and walk; game time runs all the same
+    /// Keep the camera still; game time runs
     #[arg(long)]
     stand: bool,
-    /// Pictures to make, by the table's names; all where none is named
+    /// Pictures to make, by the table's names; default: all
     #[arg(long, value_name = "NAME")]
     picture: Vec<String>,
-    /// Leave out the lights that go out and fly by
+    /// Omit the measurements with dynamic lights
     #[arg(long)]
     no_lights: bool,
     /// Size in pixels
@@ -73,7 +74,7 @@ pub struct MeasureArgs {
     /// Frames of the reference
     #[arg(long, default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..))]
     reference: u32,
-    /// Frames that lead to a picture, and frames over which noise is taken
+    /// Frames before a picture, and frames over which noise is measured
     #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(2..))]
     frames: u32,
     #[arg(long, help = help("rt_bounces"), value_parser = value_of("rt_bounces"), default_value = default("rt_bounces"))]
@@ -83,7 +84,7 @@ pub struct MeasureArgs {
     /// Vulkan device: part of its name
     #[arg(long, value_name = "NAME")]
     device: Option<String>,
-    /// Folder for the pictures of every variant beside the reference, and of which pixels show reflections and the like
+    /// Folder for the pictures of every variant, the reference, and the mask of pixels with specular paths
     #[arg(short, long, value_name = "PATH")]
     output: Option<PathBuf>,
     /// Print JSON in place of a table
@@ -93,16 +94,16 @@ pub struct MeasureArgs {
     set: SettingArgs,
 }
 
-/// Distance of the light that is switched, before the eye, and its reach: about an explosion.
+/// Distance of the switched light from the camera, and its radius, units: about an explosion.
 const LIGHT_DISTANCE: f32 = 96.0;
 const LIGHT_REACH: f32 = 300.0;
-/// Units a frame of the light that moves: a rocket at 60 frames a second.
+/// Speed of the moving light, units a frame: a rocket at 60 frames a second.
 const LIGHT_SPEED: f32 = 15.0;
 
-/// Frames that the eye takes to adapt: two seconds.
+/// Frames until automatic exposure has adapted: two seconds.
 const ADAPTATION: u32 = 120;
 
-/// Mean luminance of what a player sees in the traced look over that of the classic look, as displayed.
+/// Mean luminance of the displayed traced look over that of the classic look.
 fn brightness(
     stage: &mut Stage,
     base: &Settings,
@@ -125,7 +126,7 @@ fn brightness(
     Ok(seen(true, ADAPTATION)? / classic.max(1.0e-3))
 }
 
-/// What was measured at one place.
+/// Measures one place.
 fn place(
     stage: &mut Stage,
     args: &MeasureArgs,
@@ -164,7 +165,7 @@ fn place(
         }
         let picture = stage.picture()?;
 
-        // at rest: settled, then watched
+        // at rest: first half to settle, second half to measure
         let mut watched = Vec::new();
         for frame in 0..2 * args.frames {
             stage.frame(camera, 0, &[])?;
@@ -198,22 +199,22 @@ fn place(
     Ok(Value::Object(results))
 }
 
-/// What lights that go out or fly by leave, and the truth about it.
+/// References for a light that is switched off, and for one that moves.
 struct Lights {
-    /// How far the light that flies by is to the left at the end, units.
+    /// Offset of the moving light to the left at the end, units.
     moved: f32,
     dark: Vec<f32>,
     /// The view with that light.
     flown: Rgb8,
     flown_light: Vec<f32>,
-    /// Where the light that goes out was seen, and where one that has flown by was and is no more.
+    /// Pixels that the switched light reached, and those that the moving light reached and left.
     reached: Vec<bool>,
     left: Vec<bool>,
 }
 
-/// A pixel tells of a light that went out where the light made it at least twice as bright and by this much of display white
-/// brighter, and where it is not black without: at least this much of display white, 7 of 255 as displayed. At least this
-/// part of the picture has to tell.
+/// Thresholds of the pixels that the switched light reached: at least twice as bright with the light, brighter by this
+/// part of display white, and without the light at least this part of display white (7 of 255 as displayed); and the
+/// least share of such pixels in the picture.
 const SEEN_LIGHT: f32 = 0.01;
 const SEEN_DARK: f32 = 0.002;
 const SEEN_PART: f32 = 0.002;
@@ -236,12 +237,12 @@ impl Lights {
         camera: &Camera,
         bar: &ProgressBar,
     ) -> Result<Self> {
-        // of means over as many frames as possible: relative errors of dark places count
+        // half of the frames: errors are relative, so dark places need a precise mean
         let (truth, dark) = stage.reference(base, camera, &[], args.reference.div_ceil(2), bar)?;
-        // a lit picture needs less: it only tells which pixels the light reaches
+        // fewer frames: the lit picture only selects the pixels that the light reaches
         let frames = args.reference.div_ceil(8);
         let (lit, _) = stage.reference(base, camera, &[Self::light(camera, 0.0)], frames, bar)?;
-        // the light that moves comes from the left and is here at the end
+        // the moving light starts at the left and ends here
         let moved = LIGHT_SPEED * args.frames as f32 * 0.25;
         let light = Self::light(camera, -moved);
         let (flown, flown_light) =
@@ -254,7 +255,7 @@ impl Lights {
         if (count as f32) < SEEN_PART * reached.len() as f32 {
             reached.fill(false);
         }
-        // where the light was some frames ago and its light is not any more
+        // pixels that the light reached some frames ago and does not reach now
         let left = reached
             .iter()
             .zip(flown_light.iter().zip(&dark))
@@ -270,7 +271,7 @@ impl Lights {
         })
     }
 
-    /// Figures, and the picture at the end of the flight.
+    /// Measures the error of both lights; also returns the picture at the end of the movement.
     fn measure(
         &self,
         stage: &mut Stage,
@@ -289,7 +290,7 @@ impl Lights {
             bar.inc(1);
             off.push(relative_bias(&stage.light()?, &self.dark, &self.reached));
         }
-        // for good: not only while it passes from too bright to too dark
+        // last frame above the limit: the bias may cross zero before
         let gone = off.iter().rposition(|bias| bias.abs() > 0.1);
         let gone = match (self.reached.contains(&true), gone.map_or(0, |i| i + 1)) {
             (false, _) => json!("nothing"),
@@ -332,7 +333,7 @@ fn save(folder: &Path, name: &str, picture: &Rgb8) -> Result<()> {
     .with_context(|| format!("{}: cannot be written", path.display()))
 }
 
-/// The places of `relight cameras`, seen with a player's eyes.
+/// Cameras at the places of `relight cameras`.
 fn ruled_cameras(entities: &[q3bsp::Entity], each: usize) -> Vec<Camera> {
     let camera = |at: &Place| Camera {
         origin: at.origin + Vec3::Z * VIEW_HEIGHT,

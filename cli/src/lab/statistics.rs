@@ -1,10 +1,10 @@
-//! What `relight-lab measure` takes from pictures.
+//! Statistics of pictures for `relight-lab measure`.
 
 use glam::Vec3;
 use relight::compare::Rgb8;
 use relight::overbright;
 
-/// Radiance as displayed of each pixel: luminance of the decoded values, 0 to 1.
+/// Displayed luminance of each pixel, linear, 0 to 1.
 pub fn luminance(picture: &Rgb8) -> Vec<f32> {
     let linear = overbright::byte_table();
     let pixels = picture.pixels().chunks_exact(3);
@@ -17,14 +17,14 @@ pub fn luminance(picture: &Rgb8) -> Vec<f32> {
         .collect()
 }
 
-/// Mean of the values that `part` marks; 0 without any.
+/// Mean of the values selected by `part`; 0 for none.
 pub fn marked_mean(values: &[f32], part: &[bool]) -> f32 {
     let marked = || values.iter().zip(part).filter(|(_, m)| **m);
     let sum: f64 = marked().map(|(v, _)| f64::from(*v)).sum();
     (sum / marked().count().max(1) as f64) as f32
 }
 
-/// Median over the pixels that `part` marks of standard deviation over mean of their values in time.
+/// Temporal noise: median over the selected pixels of standard deviation over mean in time.
 pub fn temporal_noise(frames: &[Vec<f32>], part: &[bool]) -> f32 {
     let count = frames.len() as f32;
     let pixels = frames.first().map_or(0, Vec::len);
@@ -34,7 +34,7 @@ pub fn temporal_noise(frames: &[Vec<f32>], part: &[bool]) -> f32 {
             let values = || frames.iter().filter_map(|f| f.get(pixel));
             let mean = values().sum::<f32>() / count;
             let variance = values().map(|v| (v - mean) * (v - mean)).sum::<f32>() / count;
-            // black has no noise that could be seen, and no ratio
+            // no ratio for black pixels, whose noise is invisible
             (mean > 1.0e-3).then(|| variance.sqrt() / mean)
         })
         .collect();
@@ -42,7 +42,7 @@ pub fn temporal_noise(frames: &[Vec<f32>], part: &[bool]) -> f32 {
     ratios.get(ratios.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// Mean error of `picture` relative to the mean of `truth`, over the pixels that `part` marks.
+/// Mean absolute error of `picture` over the mean of `truth`, for the selected pixels.
 pub fn relative_error(picture: &[f32], truth: &[f32], part: &[bool]) -> f32 {
     let (mut error, mut sum) = (0.0, 0.0);
     for ((value, truth), _) in picture
@@ -57,7 +57,7 @@ pub fn relative_error(picture: &[f32], truth: &[f32], part: &[bool]) -> f32 {
     if sum > 0.0 { error / sum } else { 0.0 }
 }
 
-/// Signed: how much too bright the marked pixels are in the mean, relative to the truth's mean.
+/// Mean signed error of `picture` over the mean of `truth`, for the selected pixels.
 pub fn relative_bias(picture: &[f32], truth: &[f32], part: &[bool]) -> f32 {
     let marked = || picture.iter().zip(truth).zip(part).filter(|(_, m)| **m);
     let sum: f32 = marked().map(|((_, t), _)| t).sum();
@@ -71,7 +71,7 @@ mod tests {
 
     #[test]
     fn noise_is_the_median_of_deviation_over_mean() {
-        // pixels: still, between 1 and 3 (deviation 1, mean 2), black
+        // pixels: constant, between 1 and 3 (deviation 1, mean 2), black
         let frames = [vec![1.0, 1.0, 0.0], vec![1.0, 3.0, 0.0]];
         assert!((temporal_noise(&frames, &[true; 3]) - 0.5).abs() < 1.0e-6);
         assert_eq!(temporal_noise(&frames, &[true, false, true]), 0.0);

@@ -1,4 +1,4 @@
-//! How alike pictures are, of parts of the picture.
+//! Similarity of pictures by region.
 
 use anyhow::Result;
 use relight::compare::{Rgb8, flip_map, ssim_map};
@@ -6,13 +6,13 @@ use serde_json::{Map, Value, json};
 
 use crate::lab::statistics::{marked_mean, temporal_noise};
 
-/// The true picture, and which of its pixels are told of apart.
+/// The reference, and the regions of its pixels.
 pub struct Regions {
     truth: Rgb8,
     all: Vec<bool>,
-    /// Seen by way of a mirror, a portal, glass, a liquid or a shiny surface.
+    /// Pixels with specular paths: mirror, portal, glass, liquid or shiny surface.
     specular: Vec<bool>,
-    /// The others.
+    /// All other pixels.
     direct: Vec<bool>,
 }
 
@@ -27,27 +27,27 @@ impl Regions {
         }
     }
 
-    /// Part of the picture that shows reflections and the like, 0 to 1.
+    /// Share of pixels with specular paths, 0 to 1.
     pub fn specular_share(&self) -> f32 {
         let count = self.specular.iter().filter(|s| **s).count();
         count as f32 / self.specular.len().max(1) as f32
     }
 
-    /// Which pixels these are, white on black.
+    /// Mask of these pixels, white on black.
     ///
     /// # Errors
-    /// None where the regions are of the picture's size.
+    /// The mask's size differs from the picture's.
     pub fn picture(&self) -> Result<Rgb8> {
         let pixels = self.specular.iter().flat_map(|s| [u8::from(*s) * 255; 3]);
         let (width, height) = (self.truth.width(), self.truth.height());
         Ok(Rgb8::new(width, height, pixels.collect())?)
     }
 
-    /// Similarity of what a moving and a resting camera show, and the noise of the latter, of all pixels and of each part
-    /// that there is at least a hundredth of.
+    /// Similarity of pictures of a moving and of a resting camera, and noise of the latter; of all pixels, and of each
+    /// region with at least a hundredth of them.
     ///
     /// # Errors
-    /// Pictures of another size, or too small ones.
+    /// The pictures differ in size, or are too small.
     pub fn compare(
         &self,
         moving: &Rgb8,

@@ -1,4 +1,4 @@
-//! A map that pictures are taken of, and the ways to make them.
+//! A loaded map, and the variants of its pictures.
 
 use anyhow::Result;
 use glam::{Mat3, Vec3};
@@ -9,24 +9,24 @@ use renderer_vk::{DebugOutput, DenoiserChoice, LightSelection, Renderer, Setting
 
 use crate::view::Camera;
 
-/// Degrees that the camera turns and units that it moves forward in a frame on its way to a place: a player who looks
-/// around while walking.
+/// Rotation of the camera in degrees, and its movement in units, in a frame on its way to a place: about those of a
+/// walking player.
 const TURN: f32 = 0.5;
 const WALK: f32 = 0.75;
 
-/// Milliseconds of a frame on that way, and game time at its end: what ripples and drifts does so on the way.
+/// Duration of a frame on that way, milliseconds, and game time at its end, for surfaces that change with time.
 const FRAME_TIME: u32 = 16;
 const ARRIVAL_TIME: i32 = 60_000;
 
-/// A way to make the picture.
+/// A variant of the picture.
 pub struct Variant {
-    /// As the table calls it.
+    /// Name in the table.
     pub name: &'static str,
-    /// What makes it.
+    /// Its settings.
     pub settings: Settings,
 }
 
-/// One light sample a pixel, and what is done with it.
+/// The variants: one light sample a pixel, with different filters.
 pub fn variants(base: &Settings) -> Vec<Variant> {
     let with = |name, change: &dyn Fn(&mut Settings)| {
         let mut settings = base.clone();
@@ -54,23 +54,23 @@ pub fn variants(base: &Settings) -> Vec<Variant> {
     ]
 }
 
-/// A map that pictures are taken of.
+/// A loaded map with a camera.
 pub struct Stage {
-    /// Has the map.
+    /// The renderer, with the map.
     pub renderer: Renderer,
-    /// What the game would add to every view.
+    /// The entities that the game would add to every view.
     pub entities: Vec<RefEntity>,
-    /// A model in the hands, by its handle.
+    /// Handle of a first-person model.
     pub held: Option<i32>,
-    /// Pixels.
+    /// Size of pictures, pixels.
     pub size: (u32, u32),
-    /// Horizontal, degrees.
+    /// Horizontal field of view, degrees.
     pub fov: f32,
-    /// The camera is at its place from the first frame on.
+    /// The camera stands still in all frames.
     pub stand: bool,
 }
 
-/// Where a model in the hands is, units forward, to the left and up of the camera: about where games put it.
+/// Position of a first-person model, units forward, left and up from the camera: about that of games.
 const HELD_AT: Vec3 = Vec3::new(12.0, -5.0, -7.0);
 
 impl Stage {
@@ -110,7 +110,7 @@ impl Stage {
         Ok(())
     }
 
-    /// Linear luminance of what the last frame shows, before exposure.
+    /// Linear luminance of the last frame, before exposure.
     ///
     /// # Errors
     /// The device is lost or out of memory.
@@ -120,7 +120,7 @@ impl Stage {
         Ok(radiance.iter().map(luminance).collect())
     }
 
-    /// The pixels whose light comes by way of a mirror, a portal, glass, a liquid or a shiny surface.
+    /// Mask of the pixels with specular paths: mirror, portal, glass, liquid or shiny surface.
     ///
     /// # Errors
     /// The device is lost or out of memory.
@@ -137,7 +137,7 @@ impl Stage {
         Ok(pixels.map(|p| p.iter().any(|v| *v > 127)).collect())
     }
 
-    /// What the last frame shows.
+    /// The last frame.
     ///
     /// # Errors
     /// The device is lost or out of memory.
@@ -150,12 +150,12 @@ impl Stage {
         )?)
     }
 
-    /// Forgets all frames: the next one starts without a past.
+    /// Drops the history: the next frame has none.
     ///
     /// # Errors
     /// The device is lost or out of memory.
     pub fn cut(&mut self, camera: &Camera, settings: &Settings) -> Result<()> {
-        // a frame of the other mode ends both kinds of memory
+        // a frame of the other mode drops the history and the accumulated mean
         let other = Settings {
             rt_accumulate: !settings.rt_accumulate,
             ..settings.clone()
@@ -166,7 +166,7 @@ impl Stage {
         Ok(())
     }
 
-    /// The mean of `frames` frames, as displayed and as luminance before exposure.
+    /// The mean of `frames` frames, as displayed, and as luminance before exposure.
     ///
     /// # Errors
     /// The device is lost or out of memory.
@@ -191,7 +191,7 @@ impl Stage {
     }
 }
 
-/// Where the camera is `left` frames before it arrives.
+/// The camera `left` frames before it arrives.
 fn on_the_way(camera: &Camera, left: u32) -> Camera {
     let left = left as f32;
     let [forward, ..] = camera.axis();

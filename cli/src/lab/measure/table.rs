@@ -1,8 +1,8 @@
-//! What was measured, as text.
+//! Measurements as a table.
 
 use serde_json::{Map, Value};
 
-/// The figures of a line: heading, where it is in what was measured, factor, digits behind the point.
+/// Columns: heading, JSON pointer, factor, decimals.
 const COLUMNS: [(&str, &str, f64, usize); 8] = [
     ("SSIM", "/ssim", 1.0, 4),
     ("FLIP", "/flip", 1.0, 4),
@@ -24,7 +24,7 @@ fn row(value: &Value) -> Row {
     })
 }
 
-/// Frames that a light that went out was seen for: none where it lit nothing, endless where it never went.
+/// Frames until a switched-off light disappeared; `None` if it lit nothing, infinity if it remained.
 fn off(value: &Value) -> Option<f64> {
     match value.get("light_off_frames")? {
         Value::Null => Some(f64::INFINITY),
@@ -32,7 +32,7 @@ fn off(value: &Value) -> Option<f64> {
     }
 }
 
-/// A line for each place and way, and for the parts of the picture, and their means.
+/// Prints a row for each place, variant and region, and their means.
 pub fn print(all: &Map<String, Value>) {
     print!("{:<20} {:<22}", "place", "picture");
     COLUMNS.iter().for_each(|(name, ..)| print!(" {name:>9}"));
