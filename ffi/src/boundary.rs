@@ -10,9 +10,10 @@
 //! extern "C" fn`. Its `# Safety` section has the requirements on its arguments. These hold for all exports:
 //! - **Thread.** The engine calls on the thread that called `GetRefAPI`. On any other thread [`entry`] does nothing and
 //!   returns 0; no argument is read.
-//! - **Memory.** An export uses a pointer only during the call, unless its section says otherwise; no other code writes
-//!   to that memory meanwhile. The memory of game modules is not aligned, so that exports use unaligned accesses.
-//! - **Null.** A pointer may be null unless its section says otherwise. A null input has a value that the section
+//! - **Memory.** An export uses a pointer only during the call, unless its section states otherwise; no other code
+//!   writes to that memory meanwhile. The memory of game modules is not aligned, so that exports use unaligned
+//!   accesses.
+//! - **Null.** A pointer may be null unless its section states otherwise. A null input has a value that the section
 //!   states; a null output is not written.
 //! - **No return.** The call may end in the engine's `Error`, a `longjmp`. Every frame between the engine's `setjmp`
 //!   and the export must then be a *plain old frame* (RFC 2945): one without a pending destructor or `catch_unwind`. C
@@ -64,7 +65,7 @@ fn keep_message(text: &str) -> *const c_char {
     while !text.is_char_boundary(end) {
         end -= 1;
     }
-    // SAFETY: main thread only, and no reference into the buffer lives outside this function.
+    // SAFETY: main thread only, and no reference into the buffer leaves this function.
     let buffer = unsafe { &mut *MESSAGE.0.get() };
     buffer.fill(0);
     for (to, from) in buffer.iter_mut().zip(text.bytes().take(end)) {

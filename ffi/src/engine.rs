@@ -46,7 +46,7 @@ pub mod cvar_flags {
 /// Limit of game paths, bytes, including the NUL.
 pub const MAX_QPATH: usize = 64;
 
-/// A console variable of the engine. Only the front end of that engine knows its type.
+/// A console variable of the engine. Its type is defined by the front end of that engine.
 #[derive(Clone, Copy, Debug)]
 pub struct Variable(NonNull<c_void>);
 

@@ -276,7 +276,7 @@ impl MapBuilder {
         self.add_cell(mins, maxs)
     }
 
-    /// Decides whether cluster `a` sees cluster `b` (one way). Without such a decision everything sees
+    /// Decides whether cluster `a` sees cluster `b` (one way). Without such a call every cluster sees
     /// everything. Only clusters that exist already can be decided about.
     pub fn set_sees(&mut self, a: i32, b: i32, sees: bool) {
         let clusters = self.cells.len();

@@ -6,7 +6,7 @@ use crate::error::{Error, Lump};
 /// Most directory entries that a format read here has.
 pub(crate) const SLOTS: usize = 18;
 
-/// Where a lump lies in the file, as the directory says. Empty lumps may have any offset.
+/// Where a lump lies in the file, by the directory. Empty lumps may have any offset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LumpRange {

@@ -1,5 +1,5 @@
 //! Flag bits of the shader lump, as the map compiler wrote them (the engine's `surfaceflags.h` values), and how the
-//! bits of other games are said in them.
+//! bits of other games are converted to them.
 
 /// Surface flags ([`crate::ShaderRef::surface_flags`]).
 pub mod surface_flags {
@@ -7,7 +7,7 @@ pub mod surface_flags {
     pub const NODAMAGE: u32 = 0x1;
     /// Low friction.
     pub const SLICK: u32 = 0x2;
-    /// Lets the sky show.
+    /// Shows the sky.
     pub const SKY: u32 = 0x4;
     /// Can be climbed.
     pub const LADDER: u32 = 0x8;

@@ -1,4 +1,4 @@
-//! The formats that are read, and how one is told from another.
+//! The formats that are read, and how they are distinguished.
 
 use crate::bytes::Fields;
 use crate::container::LumpRange;

@@ -1,9 +1,9 @@
 //! What formats with light styles (`RBSP`, `FBSP`) store beyond the first layer of light, and the advertisements of
 //! Quake Live.
 //!
-//! Layer 0 of a surface is in [`crate::Surface`] and [`crate::DrawVert`], so that a reader that knows nothing of
-//! styles sees the map as it is lit by its first style. A style is a number that the game gives a brightness to: 0 is
-//! constant, 255 says that a layer is not used.
+//! Layer 0 of a surface is in [`crate::Surface`] and [`crate::DrawVert`], so that a reader without support for
+//! styles gets the map lit by its first style. A style is a number that the game gives a brightness to: 0 is
+//! constant, 255 marks an unused layer.
 
 use crate::bytes::{Fields, Put, Record};
 use crate::ids::{PlaneId, ShaderId};

@@ -2,7 +2,7 @@
 //!
 //! Read are `IBSP` 46 (Quake III and its mods), `IBSP` 47 (RTCW, Enemy Territory, Quake Live), `RBSP` 1 (Raven's games),
 //! `FBSP` 1 (QFusion), and, converted, the maps of Quake, GoldSrc and Quake II (feature `quake`), all into the same [`Bsp`];
-//! [`Bsp::format`] tells which it was.
+//! [`Bsp::format`] is the original format.
 //!
 //! [`Bsp::parse`] checks everything that a reader would otherwise have to check again: the directory,
 //! the record sizes and every index of every lump. What the engine refuses is a typed [`Error`] that
@@ -127,7 +127,7 @@ pub struct Bsp {
     pub lightmaps: Vec<Lightmap>,
     /// Lump 15: light grid points, x fastest; see [`Bsp::light_grid`].
     pub light_grid: Vec<GridPoint>,
-    /// Lump 16: potentially visible sets. `None` when absent or unusable: everything sees everything.
+    /// Lump 16: potentially visible sets. `None` if absent or unusable: all clusters are mutually visible.
     pub visibility: Option<Visibility>,
     /// Light styles and what else `RBSP` and `FBSP` add; empty in other formats.
     pub layers: Layers,

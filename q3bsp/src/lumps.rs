@@ -35,7 +35,7 @@ impl ShaderRef {
         }
     }
 
-    /// With the flags of Raven's games said in ours.
+    /// Converts the flags of Raven's games to ours.
     pub(crate) fn read_as_raven(mut self) -> ShaderRef {
         let raw = [self.surface_flags, self.content_flags];
         [self.surface_flags, self.content_flags] = flags::from_raven(raw);

@@ -21,7 +21,7 @@ pub enum SurfaceKind {
     /// A mesh that stands in many places (`IBSP` 47, Enemy Territory); stored 5. `patch_height` vertices are the mesh,
     /// the `patch_width` that follow are its places. See [`crate::Bsp::foliage_mesh`].
     Foliage,
-    /// A number that the engine does not know. Never in a validated map.
+    /// Unknown to the engine. Never in a validated map.
     #[cfg_attr(feature = "serde", serde(untagged))]
     Other(i32),
 }

@@ -74,8 +74,8 @@ impl Bsp {
         leaf.map_or(-1, |leaf| leaf.cluster)
     }
 
-    /// Whether a point lies inside of something solid that is seen from outside: in a solid brush of the world of which
-    /// some side is drawn. Detail brushes do not make solid leafs, so [`Bsp::cluster_at`] does not tell. `margin`: how far
+    /// Whether a point lies inside of something solid that is seen from outside: in a solid brush of the world with a
+    /// drawn side. Detail brushes do not make solid leafs, so [`Bsp::cluster_at`] cannot decide this. `margin`: how far
     /// inside, id units.
     pub fn is_in_drawn_brush(&self, p: Vec3, margin: f32) -> bool {
         let solid = |b: &Brush| self.shader(b.shader).content_flags & content_flags::SOLID != 0;
@@ -213,7 +213,7 @@ mod tests {
         let bsp = map.build();
         let inside = |x: f32, margin: f32| bsp.is_in_drawn_brush(at(x), margin);
         assert!(bsp.cluster_at(at(100.0)) >= 0 && inside(100.0, 0.0));
-        // Nor is what nobody can see, or nothing bumps into, something to be in.
+        // Nor do invisible or non-solid brushes count.
         assert!(!inside(200.0, 0.0) && !inside(300.0, 0.0) && !inside(160.0, 0.0));
         assert!(inside(119.0, 0.5) && !inside(119.0, 1.5));
         assert!(!inside(121.0, 0.0) && !inside(121.0, -0.5) && inside(121.0, -1.5));

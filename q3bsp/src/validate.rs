@@ -1,4 +1,4 @@
-//! Every reference between lumps, checked once so that nobody needs to check it again.
+//! Every reference between lumps, checked once, so that no reader needs to check it again.
 //!
 //! The line between error and repair is the engine's behaviour: values that it ignores or maps to
 //! something harmless are repaired, values that it refuses, or would follow out of its arrays, are errors.
@@ -224,7 +224,7 @@ impl Bsp {
                     let action = "not in the visibility lump: never drawn, sees everything";
                     log.replace(element, cluster, &mut leaf.cluster, -1, action);
                 }
-                // Without sets all clusters are alike, so that a number nobody could count up to
+                // Without sets all clusters are alike, so that an absurdly large number
                 // may as well be 0.
                 None if i64::from(leaf.cluster) >= leafs as i64 => {
                     let action = "more than there are leafs; taken as 0, as all see each other";

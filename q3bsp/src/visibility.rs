@@ -14,7 +14,7 @@ pub struct Visibility {
     pub clusters: usize,
     /// Bytes per row, at least `clusters / 8` rounded up.
     pub bytes_per_cluster: usize,
-    /// `clusters × bytes_per_cluster` bytes; bit `c & 7` of byte `c >> 3` in row `r` says that `r` sees `c`.
+    /// `clusters × bytes_per_cluster` bytes; bit `c & 7` of byte `c >> 3` in row `r` is set if `r` sees `c`.
     pub rows: Vec<u8>,
 }
 

@@ -186,7 +186,7 @@ impl Bsp {
         out
     }
 
-    /// The stored form of the light grid, while it still says what [`Bsp::light_grid`] does.
+    /// The stored form of the light grid, while it is equal to [`Bsp::light_grid`].
     fn stored_grid(&self) -> Option<(&[GridLayers], &[u16])> {
         (self.layers.spread_grid() == self.light_grid)
             .then_some((&self.layers.grid_points, &self.layers.grid_indices))
@@ -194,7 +194,7 @@ impl Bsp {
 }
 
 impl Container {
-    /// Forgets the file a map came from, so that it is written in the usual order without banner,
+    /// Drops the layout of the map's file, so that it is written in the usual order without banner,
     /// odd bytes or repaired values.
     pub fn forget(&mut self) {
         *self = Container::default();
@@ -209,7 +209,7 @@ fn encode<T: Record>(records: &[T]) -> Vec<u8> {
     out
 }
 
-/// Encodes records that are kept in two lists, the second of which may be shorter.
+/// Encodes records that are kept in two lists; the second one may be shorter.
 fn encode_with<A: Copy, B: Copy, T: Record>(
     records: &[A],
     more: &[B],

@@ -234,7 +234,7 @@ fn flags_of_raven_are_said_in_ours_and_kept() {
     let mut bytes = bsp.write();
     let at = i32_at(&bytes, 8 + 8) as usize + 64;
     assert_eq!([i32_at(&bytes, at), i32_at(&bytes, at + 4)], [0x20_2000, 4]);
-    // A material number and a bit that only the game knows.
+    // A material number and a bit that only the game defines.
     bytes[at] = 5;
     bytes[at + 5] = 0x80;
     let read = Bsp::parse(&bytes).unwrap();

@@ -147,7 +147,7 @@ fn wrong_sizes_are_errors() {
     }
 }
 
-/// Breaks the sample in memory and says what the check finds.
+/// Breaks the sample in memory and returns the result of the check.
 fn broken(change: impl FnOnce(&mut Bsp)) -> Error {
     let mut bsp = sample();
     change(&mut bsp);

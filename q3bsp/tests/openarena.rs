@@ -107,7 +107,7 @@ fn every_map_is_read_and_written_back() {
     assert_eq!(warned.len(), 19 + 74, "{warned:#?}");
 }
 
-/// What the file says elsewhere about directions agrees with winding, patch normals, tree and grid.
+/// Directions stored elsewhere in the file agree with winding, patch normals, tree and grid.
 #[test]
 fn geometry_is_the_right_way_round() {
     let Some(game) = testkit::game() else { return };

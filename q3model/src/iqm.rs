@@ -30,7 +30,7 @@ pub struct Iqm {
     pub frame_data: Vec<u16>,
     /// Numbers of one frame.
     pub numbers_per_frame: usize,
-    /// Smallest and largest corner for each key-frame. When the file tells none: of a model without frames those of its
+    /// Smallest and largest corner for each key-frame. Without any in the file: for a model without frames those of its
     /// vertices, else empty.
     pub bounds: Vec<(Vec3, Vec3)>,
 }
@@ -61,7 +61,7 @@ pub struct IqmVertex {
     pub normal: Vec3,
     /// Texture coordinates.
     pub st: Vec2,
-    /// Colour; black without alpha when the file tells none, as in the engine.
+    /// Colour; black without alpha if the file has none, as in the engine.
     pub color: [u8; 4],
     /// Joints that it hangs on, each of the skeleton; those after the first weight of 0 mean nothing.
     pub joints: [u8; IQM_WEIGHTS],

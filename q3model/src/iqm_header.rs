@@ -50,7 +50,7 @@ impl Header {
         let _adjacency = f.u32();
         let joints = list(&mut f);
         let poses = list(&mut f);
-        // named ranges of frames: the game knows its own
+        // named ranges of frames: games define their own
         let _animations = list(&mut f);
         Ok(Header {
             file_size,

@@ -23,7 +23,7 @@ impl Iqm {
     /// triangles per surface, do not apply. Animations, tangents, adjacency and extensions are not kept.
     ///
     /// # Errors
-    /// A wrong magic or version; a file shorter than it says; no positions, normals or texture coordinates, or no
+    /// A wrong magic or version; a file shorter than its header's size; no positions, normals or texture coordinates, or no
     /// weights where there are joints; arrays of a form that the engine does not take; counts or offsets that lead
     /// outside the file; triangle corners that name no vertex of their surface; weights and parents that name no
     /// joint, or a parent that does not come first; poses that are not one for each joint.

@@ -10,7 +10,7 @@ use crate::iqm_header::{HEADER_BYTES, MAGIC, VERSION};
 use crate::iqm_parse::{JOINT_BYTES, MESH_BYTES, POSE_BYTES};
 use crate::write::{patch, put, put_count, put_floats, put_triangles, put_vec3};
 
-/// Where in the header the file's size and the lists are told.
+/// Offset in the header of the file size, which the lists follow.
 const FILE_SIZE_AT: usize = 20;
 const TEXT_AT: usize = 28;
 
@@ -33,19 +33,19 @@ impl Iqm {
         put_count(&mut out, VERSION as usize);
         out.resize(HEADER_BYTES, 0);
         let mut header = TEXT_AT;
-        let mut tell = |out: &mut Vec<u8>, numbers: &[usize]| {
+        let mut put_header = |out: &mut Vec<u8>, numbers: &[usize]| {
             for &number in numbers {
                 patch(out, header, number);
                 header += 4;
             }
         };
         let at = out.len();
-        tell(&mut out, &[text.bytes.len(), at]);
+        put_header(&mut out, &[text.bytes.len(), at]);
         out.extend_from_slice(&text.bytes);
         out.resize(out.len().next_multiple_of(4), 0);
 
         let at = out.len();
-        tell(&mut out, &[self.surfaces.len(), at]);
+        put_header(&mut out, &[self.surfaces.len(), at]);
         let mut first_triangle = 0;
         for (surface, (name, material)) in self.surfaces.iter().zip(names) {
             for number in [
@@ -64,7 +64,7 @@ impl Iqm {
 
         let arrays = self.arrays(skinned);
         let at = out.len();
-        tell(&mut out, &[arrays.len(), self.vertices.len(), at]);
+        put_header(&mut out, &[arrays.len(), self.vertices.len(), at]);
         let mut data_at = at + arrays.len() * ARRAY_BYTES;
         for (kind, format, size, data) in &arrays {
             for number in [*kind, 0, *format, *size] {
@@ -78,7 +78,7 @@ impl Iqm {
         }
 
         let at = out.len();
-        tell(&mut out, &[first_triangle, at, 0]);
+        put_header(&mut out, &[first_triangle, at, 0]);
         for surface in &self.surfaces {
             let first = u32::try_from(surface.first_vertex).unwrap_or(u32::MAX);
             let moved = |corner: u32| corner.saturating_add(first);
@@ -87,7 +87,7 @@ impl Iqm {
         }
 
         let at = out.len();
-        tell(&mut out, &[self.joints.len(), at]);
+        put_header(&mut out, &[self.joints.len(), at]);
         for (joint, name) in self.joints.iter().zip(joint_names) {
             put_count(&mut out, name);
             put_parent(&mut out, joint.parent);
@@ -96,7 +96,7 @@ impl Iqm {
         debug_assert_eq!(out.len(), at + self.joints.len() * JOINT_BYTES);
 
         let at = out.len();
-        tell(&mut out, &[self.channels.len(), at]);
+        put_header(&mut out, &[self.channels.len(), at]);
         for (channels, joint) in self.channels.iter().zip(&self.joints) {
             put_parent(&mut out, joint.parent);
             out.extend_from_slice(&channels.mask.to_le_bytes());
@@ -107,14 +107,14 @@ impl Iqm {
 
         let at = out.len();
         let frames = self.num_frames.max(self.bounds.len());
-        tell(&mut out, &[0, 0, frames, self.numbers_per_frame, at]);
+        put_header(&mut out, &[0, 0, frames, self.numbers_per_frame, at]);
         for number in &self.frame_data {
             out.extend_from_slice(&number.to_le_bytes());
         }
         out.resize(out.len().next_multiple_of(4), 0);
         if !self.bounds.is_empty() {
             let at = out.len();
-            tell(&mut out, &[at]);
+            put_header(&mut out, &[at]);
         }
         for &(mins, maxs) in &self.bounds {
             put_vec3(&mut out, mins);

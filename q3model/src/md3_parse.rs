@@ -102,7 +102,7 @@ fn read_tag(record: &[u8]) -> Tag {
     }
 }
 
-/// Follows the chain of surfaces; each says how far away the next is. A chain that comes back to a
+/// Follows the chain of surfaces; each has the offset of the next. A chain that comes back to a
 /// surface would repeat it, so that the places visited are remembered.
 fn read_surfaces(
     bytes: &[u8],

@@ -27,7 +27,7 @@ pub(crate) const TAG_BYTES: usize = 36;
 pub(crate) const COMPRESSED_ZERO: f32 = 32768.0;
 /// Units of a translation.
 pub(crate) const COMPRESSED_TRANSLATION: f32 = 1.0 / 64.0;
-/// Units of a rotation: so says the engine's own code, where its comments leave it open.
+/// Units of a rotation, from the engine's code; its comments do not define them.
 pub(crate) const COMPRESSED_ROTATION: f32 = 1.0 / 32766.0;
 
 impl Mdr {
@@ -96,7 +96,7 @@ fn bone_index(value: i32, bones: usize, what: impl Fn() -> String) -> Result<usi
     })
 }
 
-/// Frames with their bones. A negative offset says that they are compressed.
+/// Frames with their bones. A negative offset marks compressed frames.
 fn read_frames(
     file: Region<'_>,
     at: i32,
@@ -161,7 +161,7 @@ fn decompress(record: &[u8]) -> BoneMatrix {
     }
 }
 
-/// Follows the chains of levels and of surfaces; each link says how far away the next is. A chain that comes back to
+/// Follows the chains of levels and of surfaces; each has the offset of the next. A chain that comes back to
 /// a place would repeat it, so that the places visited are remembered.
 struct Chains<'a> {
     bytes: &'a [u8],
@@ -268,7 +268,7 @@ impl<'a> Chains<'a> {
             triangles,
             ..MdrSurface::default()
         };
-        // vertices have as many weights as they like, so that each says where the next is
+        // vertices have different numbers of weights, so each has the offset of the next
         let mut at = vertices_at;
         for number in 0..num_verts {
             let what = || what(&format!("vertex {number}"));

@@ -56,7 +56,7 @@ fn written_models_read_back() {
         ..iqm()
     };
     assert_eq!(Iqm::parse(&plain.write()).unwrap(), plain);
-    // what the file does not tell is found
+    // absent bounds are computed
     let untold = Iqm {
         bounds: Vec::new(),
         ..plain.clone()
@@ -176,7 +176,7 @@ fn scales_stretch_what_is_turned() {
 #[test]
 fn truncation_anywhere_is_an_error() {
     for bytes in [&*MDR, &*SMALL_MDR] {
-        // tags come last: without them the file still says that it has two
+        // tags come last: without them the header still counts two
         for length in 0..bytes.len() {
             assert!(!survive_mdr(&bytes[..length]), "{length} bytes were enough");
         }

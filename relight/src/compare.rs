@@ -61,11 +61,11 @@ pub struct Difference {
     pub mean_absolute: f64,
     /// Root of the mean squared difference, 0..255.
     pub root_mean_square: f64,
-    /// Share of pixels of which a channel differs by more than 8, 0..1.
+    /// Share of pixels with a channel that differs by more than 8, 0..1.
     pub differing: f64,
 }
 
-/// Mean FLIP of `b` against `a`: how visible the difference is to somebody who flips between the two, 0 for the same
+/// Mean FLIP of `b` against `a`: how visible the difference is to an observer who flips between the two, 0 for the same
 /// picture, at most 1. For a screen 0.7 m wide with 3840 pixels, seen from 0.7 m: the measure's own default.
 ///
 /// # Errors
@@ -134,7 +134,7 @@ impl Rgb8 {
         sum / (self.width * self.height).max(1) as f64
     }
 
-    /// Number of different colours, of which a picture with anything in it has many.
+    /// Number of different colours; large for a picture with content.
     pub fn distinct_colors(&self) -> usize {
         let mut colors: Vec<[u8; 3]> = self
             .pixels

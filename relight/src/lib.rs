@@ -8,7 +8,7 @@
 //! * [`files`]: game files behind one trait: packs, folders, an engine, memory.
 //! * [`mod@image`]: texture images as the engine reads them.
 //! * [`materials`]: scripts and implicit materials by name.
-//! * [`overbright`]: the one place that knows overbright bits, gamma and sRGB.
+//! * [`overbright`]: overbright bits, gamma and sRGB.
 //! * [`sample`]: a small synthetic game for demonstrations and tests without game data.
 //! * [`viewpoints`]: where players appear, and what they see there.
 //! * [`world`]: a map with flat geometry, resolved materials and its light sources.

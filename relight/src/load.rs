@@ -30,7 +30,7 @@ pub enum LoadError {
     /// There is no such map.
     #[error("{map}: no such file in the game folders")]
     Absent {
-        /// Game path as asked for.
+        /// The requested game path.
         map: String,
     },
     /// The file is not a map, or a damaged one.
@@ -78,7 +78,7 @@ pub struct Options<'a> {
     /// Whether the file of lights beside the map, if there is one, changes them at the end; see
     /// [`LightsByHand`](crate::light::LightsByHand).
     pub by_hand: bool,
-    /// Told of progress.
+    /// Receives progress.
     pub progress: Option<Progress<'a>>,
 }
 

@@ -127,7 +127,7 @@ fn tga(width: u32, height: u32, rgba: &[u8]) -> Vec<u8> {
     out.extend(half(width));
     out.extend(half(height));
     out.extend([32, 8]);
-    // The engine's reader takes the last row first whatever the header says.
+    // The engine's reader takes the last row first, whatever the header.
     for row in rgba.chunks_exact((width as usize * 4).max(1)).rev() {
         out.extend(
             row.as_chunks::<4>()

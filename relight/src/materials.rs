@@ -13,10 +13,10 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 #[derive(Debug)]
 pub struct Materials {
     library: Library,
-    /// Whether the image of a name exists, as far as was asked.
+    /// Whether the image of a name exists, for names requested so far.
     images: Mutex<HashMap<String, bool>>,
-    /// Materials whose fault was told.
-    told: Mutex<HashSet<String>>,
+    /// Materials whose fault was reported.
+    reported: Mutex<HashSet<String>>,
     unusable: Vec<Diagnostic>,
 }
 
@@ -26,7 +26,7 @@ pub struct Resolved {
     /// What is drawn: the script's definition, the implicit material of an image, or the default
     /// ([`Shader::default_material`]).
     pub shader: Shader,
-    /// The script's definition, also when something else is drawn: what it says about light was true for the
+    /// The script's definition, even if something else is drawn: its light directives hold for the
     /// map compiler, which needs no images.
     pub script: Option<Shader>,
     /// Why the default is drawn; `None` for a good material.
@@ -34,7 +34,7 @@ pub struct Resolved {
 }
 
 impl Resolved {
-    /// The definition that tells about light: the script's, else what is drawn.
+    /// The definition that decides about light: the script's, otherwise the drawn one.
     pub fn definition(&self) -> &Shader {
         self.script.as_ref().unwrap_or(&self.shader)
     }
@@ -48,7 +48,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 impl Materials {
     /// Reads `scripts/*.shader` in the engine's order.
     ///
-    /// Faults of scripts, and scripts that cannot be read, are told in the diagnostics; none of them is fatal.
+    /// Faults of scripts, and scripts that cannot be read, are in the diagnostics; none of them is fatal.
     pub fn load(files: &dyn GameFiles) -> (Materials, Vec<Diagnostic>) {
         let mut scripts = Vec::new();
         let mut unreadable = Vec::new();
@@ -79,7 +79,7 @@ impl Materials {
             unusable: library.dropped().to_vec(),
             library,
             images: Mutex::default(),
-            told: Mutex::default(),
+            reported: Mutex::default(),
         }
     }
 
@@ -118,7 +118,7 @@ impl Materials {
     /// Warns that the default is drawn instead of a material; once for each name, whoever finds out first.
     pub fn tell_fault(&self, name: &str, fault: &str) {
         let name = shaderscript::strip_extension(name);
-        if lock(&self.told).insert(name.to_ascii_lowercase()) {
+        if lock(&self.reported).insert(name.to_ascii_lowercase()) {
             log::warn!("material {name}: {fault}; the default is drawn");
         }
     }

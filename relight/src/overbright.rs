@@ -1,4 +1,4 @@
-//! Overbright, gamma and sRGB: the one place that knows how stored bytes become light.
+//! Overbright, gamma and sRGB: conversion of stored bytes to light.
 //!
 //! Map compilers store light at a quarter of its displayed strength, so that a lightmap can hold
 //! more than display white: *overbright*. The engine shifts lightmap texels, vertex colours and

@@ -169,9 +169,9 @@ fn animated(document: &Value, data: &[u8]) -> Vec<Animated> {
 fn nothing_moves_unless_that_is_asked_for() {
     let (document, _, report) = write(false, Lightmaps::Vertices);
     assert!(document.get("animations").is_none());
-    let told = report.warnings.join("\n");
+    let printed = report.warnings.join("\n");
     for part in ["follow each other", "brightness changes", "wobbles"] {
-        assert!(told.contains(part), "{part}: {told}");
+        assert!(printed.contains(part), "{part}: {printed}");
     }
 }
 
@@ -208,13 +208,13 @@ fn films_waves_and_wobbles_are_animated() {
     assert!(sway.values.iter().any(|v| *v > 0.09), "{sway:?}");
     assert_eq!(find("t/wheel", "rotation").times.last(), Some(&4.0));
     assert!(all.iter().all(|a| a.material != "t/rest"));
-    let told = report.warnings.join("\n");
-    assert!(!told.contains("flame: stage 0"), "{told}");
-    assert!(told.contains("sways as a whole"), "{told}");
+    let printed = report.warnings.join("\n");
+    assert!(!printed.contains("flame: stage 0"), "{printed}");
+    assert!(printed.contains("sways as a whole"), "{printed}");
     // its glow is part of the picture that the lightmap's light is in
     assert!(
-        told.contains("t/lamp: stage 2: its brightness changes"),
-        "{told}"
+        printed.contains("t/lamp: stage 2: its brightness changes"),
+        "{printed}"
     );
 }
 
@@ -237,6 +237,6 @@ fn a_glow_of_its_own_pulses_where_materials_are_lit() {
         "{glow:?}"
     );
     assert!(lamp[0].values.iter().all(|v| (0.0..=1.0).contains(v)));
-    let told = report.warnings.join("\n");
-    assert!(!told.contains("t/lamp: stage 2"), "{told}");
+    let printed = report.warnings.join("\n");
+    assert!(!printed.contains("t/lamp: stage 2"), "{printed}");
 }

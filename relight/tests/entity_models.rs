@@ -326,9 +326,9 @@ fn models_of_all_kinds_are_written_in_the_skin_that_the_entity_names() {
     let (own, skin) = ("models/t/skin", "textures/sample/lamp_warm");
     assert_eq!(materials, [own, own, skin, skin, own]);
     assert!(all[0].0 != all[2].0);
-    let told = report.warnings.join("\n");
+    let printed = report.warnings.join("\n");
     assert!(
-        told.contains("models/t/b_9.skin: there is no such skin"),
-        "{told}"
+        printed.contains("models/t/b_9.skin: there is no such skin"),
+        "{printed}"
     );
 }

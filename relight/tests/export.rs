@@ -1,5 +1,5 @@
-//! What is exported is the map: counted and measured against the map's own lumps, and read by the `gltf` crate, which
-//! nobody here wrote.
+//! What is exported is the map: counted and measured against the map's own lumps, and read by the `gltf` crate,
+//! a foreign reader.
 
 use glam::{Vec2, Vec3};
 use q3bsp::{Bsp, SurfaceKind, surface_flags};
@@ -249,8 +249,8 @@ fn agree(written: &Written, name: &str) {
     // What several entities name is there once.
     let mut models = HashSet::new();
     for mesh in document.meshes().filter(is_file) {
-        let told = mesh.extras().as_ref().map(|e| e.get().to_owned());
-        assert!(models.insert(told), "{name}: {:?} twice", mesh.name());
+        let extras = mesh.extras().as_ref().map(|e| e.get().to_owned());
+        assert!(models.insert(extras), "{name}: {:?} twice", mesh.name());
     }
     let files = document.meshes().filter(is_file);
     let of_files = files.flat_map(|m| m.primitives().collect::<Vec<_>>());

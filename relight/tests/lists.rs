@@ -1,4 +1,4 @@
-//! Light lists against rays, on made-up maps whose matrix says that everything sees everything.
+//! Light lists against rays, on made-up maps whose matrix makes all clusters mutually visible.
 
 use glam::Vec3;
 use q3bsp::builder::MapBuilder;
@@ -105,7 +105,7 @@ fn rooms(side: i32, seed: u64) -> RelitWorld {
             wall(&mut map, plain, at(j, i), Vec3::X * ROOM, b);
         }
     }
-    // a matrix in which everything sees everything
+    // a matrix in which all clusters see each other
     map.set_sees(0, 0, true);
     let mut files = MemoryFiles::new();
     files.insert("scripts/t.shader", SCRIPT).expect("a path");
@@ -142,7 +142,7 @@ fn what_rays_find_stays_in_the_lists() {
                     .all(|s| s.visible > 0.0 && s.visible <= 1.0)
             );
         }
-        // points in no cluster still know all lights
+        // points in no cluster still have all lights
         assert_eq!(swept.row(-1).len(), world.lights.len());
         let judged = judge(&world, &[&visible, swept], 512, 1);
         let [all, kept] = [judged[0], judged[1]];

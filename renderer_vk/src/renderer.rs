@@ -116,7 +116,7 @@ pub struct Renderer {
 /// Finds a device without making a window; returns its name and features.
 ///
 /// # Errors
-/// There is no Vulkan, or no suitable device; the message says which.
+/// There is no Vulkan, or no suitable device; the message has the reason.
 pub fn probe(device: Option<&str>) -> Result<DeviceInfo, Error> {
     let options = device_options(device, false);
     Ok(Device::new(&options, SurfaceSource::Headless)?

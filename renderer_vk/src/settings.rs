@@ -110,13 +110,13 @@ settings! { variables {
     draw_sun: bool = "r_drawSun", "0", ARCHIVE, None, Frame, GoesOn, "1 draws the sun's disc in the sky.";
     dynamic_light: bool = "r_dynamiclight", "1", ARCHIVE, None, Frame, Restarts, "0 ignores lights of explosions, missiles and items.";
     dlight_backs: bool = "r_dlightBacks", "1", ARCHIVE, None, Frame, GoesOn, "0 keeps dynamic light off faces turned away from it.";
-    face_plane_cull: bool = "r_facePlaneCull", "1", ARCHIVE, None, Frame, GoesOn, "0 draws flat surfaces that are turned away from the eye too; they are not seen.";
+    face_plane_cull: bool = "r_facePlaneCull", "1", ARCHIVE, None, Frame, GoesOn, "0 draws flat surfaces that face away from the camera, too; they stay invisible.";
     rail_width: f32 = "r_railWidth", "16", ARCHIVE, None, Frame, GoesOn, "Diameter of the rings of a rail trail.";
     rail_core_width: f32 = "r_railCoreWidth", "6", ARCHIVE, None, Frame, GoesOn, "Half width of the core of a rail trail.";
     rail_segment_length: f32 = "r_railSegmentLength", "32", ARCHIVE, None, Frame, GoesOn, "Distance between the rings of a rail trail.";
     ambient_scale: f32 = "r_ambientScale", "0.6", CHEAT, None, Frame, GoesOn, "Multiplies the ambient light of models in the classic look.";
     directed_scale: f32 = "r_directedScale", "1", CHEAT, None, Frame, GoesOn, "Multiplies the directed light of models in the classic look.";
-    marks_on_triangle_meshes: bool = "r_marksOnTriangleMeshes", "0", ARCHIVE, None, Frame, GoesOn, "1 lets bullet marks stick to detail meshes of the map.";
+    marks_on_triangle_meshes: bool = "r_marksOnTriangleMeshes", "0", ARCHIVE, None, Frame, GoesOn, "1 puts bullet marks on detail meshes of the map, too.";
     shadows: ModelShadows = "cg_shadows", "1", NONE, None, Frame, GoesOn, "Shadows of models in the classic look: 0 none, 1 spot, 2 volumes, 3 planar.";
     ui_fullscreen: bool = "r_uifullscreen", "0", NONE, None, Frame, GoesOn, "Set by the engine while a menu covers the game.";
     offset_factor: f32 = "r_offsetfactor", "-1", CHEAT, None, Frame, GoesOn, "Depth offset of decals by their slope in the classic look.";
@@ -142,7 +142,7 @@ settings! { variables {
     lock_pvs: bool = "r_lockpvs", "0", CHEAT, None, Frame, GoesOn, "1 keeps the visible part of the map as it is.";
     no_vis: bool = "r_novis", "0", CHEAT, None, Frame, GoesOn, "1 ignores the map's visibility.";
     no_cull: bool = "r_nocull", "0", CHEAT, None, Frame, GoesOn, "1 draws what is out of view as well.";
-    show_cluster: i32 = "r_showcluster", "0", CHEAT, None, Frame, GoesOn, "1 prints the cluster and area of the eye when they change.";
+    show_cluster: i32 = "r_showcluster", "0", CHEAT, None, Frame, GoesOn, "1 prints the cluster and area of the camera when they change.";
     // settings of this renderer
     rt: bool = "r_rt", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 traces light with rays, 0 draws the classic look. Switches at once.";
     rt_tracer: TracerChoice = "rt_tracer", "auto", ARCHIVE | LATCH, None, Start, GoesOn, "What follows the rays: auto, pipeline, query or compute. A device without it gets what auto picks.";
@@ -169,7 +169,7 @@ settings! { variables {
     rt_exposure: f32 = "rt_exposure", "0", ARCHIVE, kept(-16.0, 16.0), Frame, GoesOn, "Exposure in stops, added to the automatic one.";
     rt_auto_exposure: bool = "rt_autoExposure", "1", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 adapts the exposure to the picture.";
     rt_bloom: f32 = "rt_bloom", "0.05", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "Part of the light that spreads around bright things; 0 none.";
-    rt_flashlight: bool = "rt_flashlight", "0", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "1 carries a lamp at the eye.";
+    rt_flashlight: bool = "rt_flashlight", "0", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "1 carries a lamp at the camera.";
     rt_light_scale: f32 = "rt_lightScale", "1", ARCHIVE, kept(0.0, 100.0), Frame, Restarts, "Multiplies every light of the map when it is traced.";
     rt_dlight_scale: f32 = "rt_dlightScale", "1", ARCHIVE, kept(0.0, 100.0), Frame, Restarts, "Multiplies lights of explosions, missiles and items when they are traced.";
     rt_debug: DebugOutput = "rt_debug", "0", NONE, kept(0.0, 11.0), Frame, GoesOn, "Shows a step of the traced look in place of the picture: 1 albedo, 2 normals, 3 depth, 4 motion, 5 clusters, 6 lights per pixel, 7 samples, 8 variance, 9 gradients, 10 rays per pixel, 11 reflections.";

@@ -110,7 +110,7 @@ fn anonymous() -> u64 {
     kilobytes.unwrap_or(0) * 1024
 }
 
-/// Loads `count` maps one after the other, draws three frames of each, and says what was held then; `None`, with a
+/// Loads `count` maps one after the other, draws three frames of each, and returns what was held then; `None`, with a
 /// printed line, without a device.
 fn changes(settings: &Settings, count: usize) -> Option<Vec<Held>> {
     let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);

@@ -215,7 +215,7 @@ fn what_is_registered_is_compiled_before_it_is_seen() {
     assert!(ahead > 20, "{ahead}");
     frame(&mut renderer, &Settings::full_size());
     assert_eq!(renderer.compiled_pipelines(), ahead);
-    // and the count does tell what was not foreseen
+    // and the count includes pipelines that were not predicted
     let unforeseen = Settings {
         measure_overdraw: true,
         ..Settings::full_size()

@@ -90,7 +90,7 @@ void main() {
         out_color = stage_value(0);
         if (!passes_alpha_test(0, out_color)) discard;
 #ifdef MANY_STAGES
-        // unrolled by hand, so that every compiler sees constant arguments
+        // unrolled by hand, so that arguments are constant for every compiler
         out_color = onto(out_color, 1);
         out_color = onto(out_color, 2);
         out_color = onto(out_color, 3);

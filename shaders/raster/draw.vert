@@ -99,7 +99,7 @@ void main() {
         StagePoint point = StagePoint(position, vertices.at[gl_VertexIndex].normal, vertices.at[gl_VertexIndex].st,
             vertices.at[gl_VertexIndex].lightmap, unpackUnorm4x8(vertices.at[gl_VertexIndex].color),
             draws.at[gl_InstanceIndex].time, VIEW.identity_light, distance(VIEW.origin, world));
-        // unrolled by hand, so that every compiler sees constant arguments
+        // unrolled by hand, so that arguments are constant for every compiler
         write_stage(draws, instance, point, 0);
 #ifdef MANY_STAGES
         write_stage(draws, instance, point, 1);

@@ -93,7 +93,7 @@ void keep_lit(SurfacePoint p, vec3 lit, Path path, float t) {
     kept.view_distance = path.travelled + t;
     bool turned = dot(p.face_normal, path.direction) > 0.0;
     kept.face_normal = turned ? -p.face_normal : p.face_normal;
-    // the side that the path sees is lit
+    // the side that the path hits is lit
     kept.normal = dot(p.normal, kept.face_normal) < 0.0 ? -p.normal : p.normal;
     kept.albedo = lit;
     kept.first_person = (instance_of(p.instance).flags & INSTANCE_FIRST_PERSON) != 0;
@@ -127,8 +127,8 @@ float moved_glow(vec4 motion, vec3 front, vec3 shown) {
     return away * clamp(max_component(added) / max(MOST_FRESH * max_component(front), 1.0e-6), 0.0, 0.99);
 }
 
-// Contribution of a surface to a path: its parts in linear light; the displayed part of the background that it lets
-// through (`cover`); and the emission of lights and added light of models, shown by the texture (`own`).
+// Contribution of a surface to a path: its parts in linear light; the displayed part of the background that it
+// transmits (`cover`); and the emission of lights and added light of models, shown by the texture (`own`).
 struct SeenLayer {
     Layer linear;
     vec3 cover;

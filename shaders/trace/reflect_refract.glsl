@@ -57,8 +57,8 @@ void redirect_path(inout Path path, SurfacePoint p, float t, vec3 normal, vec3 d
     lit_plane = vec4(0.0);
 }
 
-// Continues the path mirrored. `face`: geometric normal on the path's side; `normal`: shading normal, distorted as
-// `bend` (`BENT_*`) says.
+// Continues the path mirrored. `face`: geometric normal on the path's side; `normal`: shading normal, distorted by
+// `bend` (`BENT_*`).
 void reflect_path(inout Path path, SurfacePoint p, float t, vec3 face, vec3 normal, uint bend) {
     vec3 mirrored = reflect(path.direction, normal);
     if (dot(mirrored, face) <= 0.0) mirrored = reflect(path.direction, face);

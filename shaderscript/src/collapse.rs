@@ -40,7 +40,7 @@ pub struct Pass {
 /// The passes that the engine draws for a material.
 ///
 /// Only stages 0 and 1 are ever joined. Joining is no mere optimization: the colour that both stages share (vertex,
-/// wave, identityLighting ...) is then applied once, where two passes would apply it twice, and an alpha test sees
+/// wave, identityLighting ...) is then applied once, where two passes would apply it twice, and an alpha test gets
 /// the product of the alphas.
 pub fn collapse(shader: &Shader) -> Vec<Pass> {
     let single = |first: usize, stage: &Stage| Pass {
@@ -103,7 +103,7 @@ fn joined(first: &Stage, second: &Stage) -> Option<(Combine, Option<(BlendFactor
 
 /// The material as the engine draws it with `r_vertexLight 1`: one stage, never the lightmap.
 ///
-/// `on_entity` tells that the surface has no lightmap index at all (models): its light then comes from the light
+/// `on_entity`: the surface has no lightmap index at all (models); its light then comes from the light
 /// grid instead of its vertices. Materials of one stage or none are returned as they are.
 pub fn collapse_vertex_light(shader: &Shader, on_entity: bool) -> Shader {
     let mut result = shader.clone();

@@ -192,15 +192,17 @@ mod tests {
         ]);
         assert_eq!(images(&library, "a"), ["x"]);
         assert_eq!(images(&library, "b"), ["y"], "the engine loses it");
-        let told = |library: &Library| -> Vec<String> {
+        let printed = |library: &Library| -> Vec<String> {
             (library.warnings_of_files().map(ToString::to_string)).collect()
         };
-        assert_eq!(told(&library).len(), 1);
-        assert!(told(&library)[0].starts_with("open:8:1: warning: this comment is never closed"));
-        assert!(told(&library)[0].ends_with("put */ where the comment ends"));
+        assert_eq!(printed(&library).len(), 1);
+        assert!(
+            printed(&library)[0].starts_with("open:8:1: warning: this comment is never closed")
+        );
+        assert!(printed(&library)[0].ends_with("put */ where the comment ends"));
         // a file that the engine drops cannot spoil others
         let library = Library::new([("open", "a {\n{\nmap x\n/*\n}\n}\n")]);
-        assert_eq!((library.dropped().len(), told(&library).len()), (1, 0));
+        assert_eq!((library.dropped().len(), printed(&library).len()), (1, 0));
     }
 
     #[test]

@@ -71,9 +71,9 @@ pub struct Shader {
     pub fog: Option<Fog>,
     /// Drawn slightly nearer than it is.
     pub polygon_offset: bool,
-    /// `nomipmaps` occurs; what holds for one image is told by its stage.
+    /// `nomipmaps` occurs; a stage has the flag of its own image.
     pub no_mipmaps: bool,
-    /// `nopicmip` or `nomipmaps` occurs; what holds for one image is told by its stage.
+    /// `nopicmip` or `nomipmaps` occurs; a stage has the flag of its own image.
     pub no_picmip: bool,
     /// Several entities may be drawn in one batch.
     pub entity_mergable: bool,
@@ -85,10 +85,10 @@ pub struct Shader {
     pub sun: Option<Sun>,
     /// Every sun defined; the map compiler uses them all.
     pub suns: Vec<Sun>,
-    /// What it tells the map compiler about light.
+    /// Its directives for the map compiler about light.
     pub light: LightDirectives,
     /// Every line for other programs (`q3map...`, `qer...`), whether `light` interprets it or not, and every
-    /// keyword that nobody knows.
+    /// unknown keyword.
     pub unknown: Vec<UnknownDirective>,
 }
 
@@ -302,7 +302,7 @@ impl Sun {
     }
 }
 
-/// What a material tells the map compiler about light.
+/// A material's directives for the map compiler about light.
 #[derive(Clone, Debug, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LightDirectives {

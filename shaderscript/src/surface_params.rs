@@ -95,7 +95,7 @@ const fn param(
     }
 }
 
-/// All names that the engine knows.
+/// All names of the engine.
 pub const SURFACE_PARAMS: &[SurfaceParam] = &[
     param("water", true, 0, CONTENTS_WATER),
     param("slime", true, 0, CONTENTS_SLIME),

@@ -1,7 +1,7 @@
 //! Tokens of script text, exactly as the engine cuts them.
 //!
 //! The engine first compresses the text (comments anywhere outside quotes vanish, every run of line ends becomes one
-//! newline) and then splits it at white space. [`Lexer`] does both in one pass and remembers where each token
+//! newline) and then splits it at white space. [`Lexer`] does both in one pass and stores where each token
 //! stood. What follows from the engine's way, and is kept:
 //!
 //! * White space is every byte up to a blank, and every byte from 0x80 on (its characters are signed).
@@ -188,14 +188,14 @@ impl<'a> Lexer<'a> {
         self.bytes.rest.len()
     }
 
-    /// Forgets what stands beyond `remaining` bytes counted from the end of the text.
+    /// Drops the text beyond `remaining` bytes counted from the end of the text.
     pub(crate) fn cut_before(&mut self, remaining: usize) {
         let keep = self.bytes.rest.len().saturating_sub(remaining);
         self.bytes.rest = self.bytes.rest.get(..keep).unwrap_or_default();
     }
 
     /// Next token; line ends count as blanks. `None` at the end of the text, and for an empty quoted token, which
-    /// the engine cannot tell from the end.
+    /// the engine cannot distinguish from the end.
     pub fn token(&mut self) -> Option<Token> {
         self.read(true)
     }

@@ -263,7 +263,7 @@ fn light_directives() {
         ],
     );
     let lights = || library.effective().map(|s| &s.light);
-    // One definition has two lines, of which one names an image instead of a number.
+    // One definition has two lines; one names an image instead of a number.
     assert_eq!(lights().filter(|l| l.surface_light.is_some()).count(), 539);
     let range = lights()
         .filter_map(|l| l.surface_light)
@@ -435,7 +435,7 @@ fn odd_constructs_are_tolerated() {
     let find = |name: &str| -> &Shader { library.find(name).unwrap() };
     // Quoted names lose their quotes; names with a backslash match only a backslash.
     assert!(library.definitions().iter().all(|s| !s.name.contains('"')));
-    // A name with an extension can never be asked for.
+    // A name with an extension is never requested.
     assert!(library.find("textures/castle/terrain.vertex").is_none());
     // The name of an image as the power of a light, and a number in another line.
     assert_eq!(

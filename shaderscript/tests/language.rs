@@ -181,7 +181,7 @@ fn colors() {
         assert_eq!(stage.rgb_gen, rgb_gen, "{text}");
         assert_eq!(stage.alpha_gen, AlphaGen::Identity, "{text}");
     }
-    // Vertex colours bring their alpha unless another one was asked for before.
+    // Vertex colours bring their alpha unless an earlier line defines another one.
     assert_eq!(stage("rgbGen vertex").alpha_gen, AlphaGen::Vertex);
     assert_eq!(
         stage("alphaGen entity\nrgbGen vertex").alpha_gen,

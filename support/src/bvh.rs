@@ -34,7 +34,7 @@ pub struct Child {
 }
 
 impl Child {
-    /// No child: the root is nobody's child.
+    /// No child: the root has no parent.
     const ABSENT: Self = Self {
         bounds: Aabb::EMPTY,
         first: 0,

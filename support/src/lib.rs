@@ -1,4 +1,4 @@
-//! General tools that know nothing of maps or of rendering.
+//! General tools, independent of maps and rendering.
 //!
 //! * [`aabb`]: axis-aligned boxes.
 //! * [`bvh`]: bounding volume hierarchies over boxes.

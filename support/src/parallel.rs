@@ -5,7 +5,7 @@ use std::sync::{Mutex, OnceLock};
 /// Pieces for each thread, taken as threads get free: items differ in cost.
 const PIECES: usize = 32;
 
-/// How many threads work. The system is asked once: that takes as long as little work does.
+/// How many threads work. Read from the system once, because the call takes as long as a small task.
 fn threads() -> usize {
     static THREADS: OnceLock<usize> = OnceLock::new();
     *THREADS.get_or_init(|| std::thread::available_parallelism().map_or(1, usize::from))

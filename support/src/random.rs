@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-/// PCG-like: a 64-bit linear congruential generator, of which the high bits are used after a mix.
+/// PCG-like: the high bits of a 64-bit linear congruential generator, mixed.
 #[derive(Debug, Clone)]
 pub struct Random(u64);
 
@@ -44,7 +44,7 @@ impl Random {
         (0..count).map(|_| self.bits() as u8).collect()
     }
 
-    /// An index into `count` things, of which there are less than 2^32; 0 if there are none.
+    /// An index below `count`, which must be less than 2^32; 0 if `count` is 0.
     pub fn below(&mut self, count: usize) -> usize {
         self.bits() as usize % count.max(1)
     }

@@ -1,7 +1,7 @@
 //! Damage to files.
 
-/// Replaces the 32-bit word at each of these offsets of a file by each of these values, and calls `survive`, which says
-/// whether the file was accepted.
+/// Replaces the 32-bit word at each of these offsets of a file by each of these values, and calls `survive`, which
+/// returns whether the file was accepted.
 ///
 /// # Panics
 /// Few files are accepted, or few are refused: such a test would test nothing.

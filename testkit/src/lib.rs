@@ -117,7 +117,7 @@ pub fn game() -> Option<&'static Game> {
         }
         let game = Game::open(&installed)
             .unwrap_or_else(|error| panic!("{}: {error}", installed.display()));
-        // Nothing is lost when nobody reads it.
+        // Nothing is lost without a reader.
         let _ = writeln!(io::stderr(), "{}", game.describe());
         Some(game)
     });

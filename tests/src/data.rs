@@ -34,7 +34,7 @@ fn find_library() -> PathBuf {
         .args(["build", "--quiet", "-p", "ffi"])
         .current_dir(repository());
     // <target>/<profile>/deps/<test> or <target>/<profile>/<program>
-    let program = std::env::current_exe().expect("a program knows where it is");
+    let program = std::env::current_exe().expect("the path of this program");
     let folder = program.parent().expect("a program lies in a folder");
     let profile = match folder.parent() {
         Some(profile) if folder.ends_with("deps") => profile,

@@ -28,7 +28,7 @@ impl Display {
             .spawn()
             .expect("Xvfb starts");
         let mut number = String::new();
-        let pipe = server.stdout.take().expect("a pipe was asked for");
+        let pipe = server.stdout.take().expect("the pipe of Stdio::piped");
         let read = BufReader::new(pipe).read_line(&mut number);
         let display = Self {
             server,
@@ -41,7 +41,7 @@ impl Display {
         Some(display)
     }
 
-    /// Lets a program that is about to be started show its windows here, drawn by Mesa's software OpenGL.
+    /// Sets this display for a program to be started; Mesa's software OpenGL draws its windows.
     pub fn lend_to(&self, program: &mut Command) {
         program
             .env("DISPLAY", &self.name)

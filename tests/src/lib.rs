@@ -1,7 +1,7 @@
 //! What crosses rooms: a stand-in engine that loads the built library as a real one does, runs of the real
 //! engine, and what both need.
 //!
-//! * [`engine`]: the stand-in. It lives at the library's C interface, so it is the one place here with raw pointers.
+//! * [`engine`]: the stand-in. It uses the library's C interface, so it is the one place here with raw pointers.
 //! * [`real`]: Debian's ioquake3, run without a display.
 //! * [`data`]: where OpenArena's data, the library and the tools are, and when a test may be skipped.
 //! * [`maps`]: small maps made by the tests.

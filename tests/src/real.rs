@@ -30,7 +30,7 @@ pub struct Run {
 
 /// What a run left.
 pub struct Outcome {
-    /// 0 if the engine ended as it was told to.
+    /// 0 if the engine ended on command.
     pub status: Option<i32>,
     /// What it printed.
     pub log: String,

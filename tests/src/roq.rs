@@ -4,7 +4,7 @@
 //! Source of the format: the description "id RoQ video file format" by Tim Ferguson (2001). A film is a row of chunks:
 //! 16 bits of kind, 32 of size, 16 of argument, then data. A code book has cells of 2 x 2 pixels (four luminances and
 //! two chrominances) and of 4 x 4 pixels (four of the former). A picture is a row of squares of 16 x 16 pixels, each of
-//! four of 8 x 8, whose kind is told by two bits; kind 2 is one cell of 4 x 4, enlarged.
+//! four of 8 x 8, with two bits for its kind; kind 2 is one cell of 4 x 4, enlarged.
 
 /// Kinds of chunks.
 mod chunk {
@@ -53,7 +53,7 @@ pub fn film(side: u16, pictures: &[Vec<[u8; 3]>]) -> Vec<u8> {
 }
 
 /// The squares of a picture in the order of the file: four to each of 16 x 16 pixels. Eight kinds of two bits come as a
-/// word of 16, the first in the highest bits, each word before what its kinds want to know.
+/// word of 16, the first in the highest bits, each word before the data of its kinds.
 fn squares(side: usize, picture: &[[u8; 3]], colors: &[[u8; 3]]) -> Vec<u8> {
     let across = side / 8;
     let order = (0..across / 2)

@@ -135,7 +135,7 @@ fn a_steady_frame_allocates_nothing() {
         })
         .collect();
     drop(engine);
-    // the library's panic hook tells its engine, which is gone
+    // the library's panic hook prints to its engine, which is gone
     let _ = std::panic::take_hook();
     assert_eq!(taken, [0; 8], "blocks taken by frames like the ones before");
 }

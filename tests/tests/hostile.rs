@@ -1,4 +1,4 @@
-//! Broken game data: the renderer says in one line what is wrong and where, and the game goes on.
+//! Broken game data: the renderer prints one line with the fault and its place, and the game goes on.
 
 #![forbid(unsafe_code)]
 
@@ -31,7 +31,7 @@ fn line_about(engine: &Engine, file: &str) -> String {
         .collect();
     assert!(
         !lines.is_empty(),
-        "nothing was said about {file}: {:#?}",
+        "no message about {file}: {:#?}",
         engine.messages()
     );
     lines[0].clone()

@@ -1,4 +1,4 @@
-//! A program that says that it is Quake3e: the library refuses it by its text, whatever its table.
+//! A program that identifies itself as Quake3e: the library refuses it by its text, whatever its table.
 
 use tests::engine::{Engine, LoadError, Options, Tables};
 
@@ -13,12 +13,13 @@ fn quake3e_is_named_and_told_the_way_back() {
             tables,
             ..Options::default()
         };
-        let Err(LoadError::Refused(said)) = Engine::load(&tests::data::library(), options) else {
+        let Err(LoadError::Refused(printed)) = Engine::load(&tests::data::library(), options)
+        else {
             panic!("{tables:?} is served")
         };
-        assert!(said.contains("it is Quake3e"), "{said}");
-        assert!(said.contains("+set cl_renderer opengl\""), "{said}");
-        assert!(said.contains("RELIGHT_ENGINE=ioquake3"), "{said}");
-        assert_eq!(said.lines().count(), 1, "{said}");
+        assert!(printed.contains("it is Quake3e"), "{printed}");
+        assert!(printed.contains("+set cl_renderer opengl\""), "{printed}");
+        assert!(printed.contains("RELIGHT_ENGINE=ioquake3"), "{printed}");
+        assert_eq!(printed.lines().count(), 1, "{printed}");
     }
 }

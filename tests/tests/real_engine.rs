@@ -219,8 +219,8 @@ fn lights_by_hand_light_the_traced_look() {
     let files = vec![(format!("maps/{map}.lights"), lights.into())];
     let outcome = run_with("vk", (160, 120), commands, files);
     outcome.assert_clean();
-    let told = format!("maps/{map}.lights: line 7: ");
-    assert!(outcome.log.contains(&told), "{}", outcome.log_end());
+    let printed = format!("maps/{map}.lights: line 7: ");
+    assert!(outcome.log.contains(&printed), "{}", outcome.log_end());
     let picture = outcome.picture("shot");
     keep_picture(picture, "lights-by-hand");
     let mean = |channel: usize| {

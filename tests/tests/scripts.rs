@@ -1,4 +1,4 @@
-//! What the scripts do with packs that somebody names.
+//! How the scripts treat packs on their command line.
 
 use std::io::Write;
 use std::path::Path;
@@ -32,24 +32,24 @@ fn pack(file: &Path, names: &[&str]) {
 fn a_pack_that_cannot_be_played_is_refused_with_a_remedy() {
     let root = tempfile::tempdir().expect("a folder");
     let at = |name: &str| root.path().join(name);
-    let said = |file: &Path| {
+    let printed = |file: &Path| {
         let output = shell("check_pack \"$1\"", file, root.path());
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.success(), said.is_empty(), "{said}");
-        said
+        let printed = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.success(), printed.is_empty(), "{printed}");
+        printed
     };
-    assert!(said(&at("none.pk3")).contains("is its path right?"));
-    assert!(said(root.path()).contains("is no file"));
+    assert!(printed(&at("none.pk3")).contains("is its path right?"));
+    assert!(printed(root.path()).contains("is no file"));
     std::fs::write(at("text.pk3"), "Rar!").expect("written");
-    assert!(said(&at("text.pk3")).contains("is no pack"));
+    assert!(printed(&at("text.pk3")).contains("is no pack"));
     std::fs::write(at("empty.pk3"), "").expect("written");
-    assert!(said(&at("empty.pk3")).contains("is no pack"));
+    assert!(printed(&at("empty.pk3")).contains("is no pack"));
     pack(&at("textures.pk3"), &["textures/a.tga"]);
-    assert!(said(&at("textures.pk3")).contains("has no maps"));
+    assert!(printed(&at("textures.pk3")).contains("has no maps"));
     pack(&at("below.pk3"), &["my map/maps/a.bsp"]);
-    assert!(said(&at("below.pk3")).contains("has no maps where the game reads them"));
+    assert!(printed(&at("below.pk3")).contains("has no maps where the game reads them"));
     pack(&at("good one.pk3"), &["maps/B.bsp", "maps/a-1.bsp"]);
-    assert_eq!(said(&at("good one.pk3")), "");
+    assert_eq!(printed(&at("good one.pk3")), "");
     let listed = shell("map_names \"$1\"", &at("good one.pk3"), root.path());
     assert_eq!(String::from_utf8_lossy(&listed.stdout), "a-1\nb\n");
 }

@@ -100,7 +100,7 @@ fn variables_and_lists_are_the_engines_own() {
             "{command}"
         );
     }
-    // What each renderer draws with itself differs; what the game asked for does not, nor its order, in which
+    // What each renderer draws with itself differs; what the game requested does not, nor its order, in which
     // materials of equal sort are drawn. Those without a picture are never drawn.
     let shaders = |outcome: &Outcome, command: &str| {
         let mut lines = printed(outcome, command);

@@ -48,7 +48,7 @@ cvars! {
     CustomHeight: Whole = "r_customheight", "1024", ARCHIVE | LATCH, None, "Height in pixels of r_mode -1.";
     CustomPixelAspect: Number = "r_customPixelAspect", "1", ARCHIVE | LATCH, None, "Width of a pixel over its height in r_mode -1.";
     CenterWindow: Whole = "r_centerWindow", "0", ARCHIVE | LATCH, None, "1 opens the window in the middle of the screen.";
-    AllowResize: Whole = "r_allowResize", "0", ARCHIVE | LATCH, None, "1 lets the window be resized with the mouse.";
+    AllowResize: Whole = "r_allowResize", "0", ARCHIVE | LATCH, None, "1 makes the window resizable with the mouse.";
     AvailableModes: Text = "r_availableModes", "", ROM, None, "Sizes that the display offers, set by the renderer.";
     SdlDriver: Text = "r_sdlDriver", "", ROM, None, "Video driver that SDL uses, set by the renderer.";
     DisplayRefresh: Whole = "r_displayRefresh", "0", LATCH, kept(0.0, 200.0), "Refresh rate in Hz asked for in full screen; 0 leaves it to the display.";
@@ -59,7 +59,7 @@ cvars! {
     ScreenshotJpegQuality: Whole = "r_screenshotJpegQuality", "90", ARCHIVE, None, "JPEG quality of screenshotJPEG, 1 to 100.";
     MaxPolys: Whole = "r_maxpolys", "600", NONE, None, "Polygons in a frame. There is no limit here; kept for old configurations.";
     MaxPolyVerts: Whole = "r_maxpolyverts", "3000", NONE, None, "Polygon corners in a frame. There is no limit here; kept for old configurations.";
-    DebugSurface: Whole = "r_debugSurface", "0", CHEAT, None, "1 shows collision surfaces that traces hit, higher values what bots know of the map. In the classic look.";
+    DebugSurface: Whole = "r_debugSurface", "0", CHEAT, None, "1 shows collision surfaces that traces hit, higher values the bots' navigation areas. In the classic look.";
     Device: Text = "r_device", "", ARCHIVE | LATCH, None, "Part of the name of the Vulkan device to use; empty takes the best.";
     VkValidation: Whole = "r_vkValidation", "0", LATCH, kept(0.0, 1.0), "1 loads the Vulkan validation layer and prints what it finds.";
     Headless: Whole = "r_headless", "0", LATCH, kept(0.0, 1.0), "1 renders without a window, for tests.";

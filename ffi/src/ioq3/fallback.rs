@@ -159,7 +159,7 @@ unsafe fn load_from(
             if exports.is_null() {
                 continue;
             }
-            // SAFETY: not null, so it is the renderer's static table, which lives as long as its library.
+            // SAFETY: not null, so it is the renderer's static table, which is valid as long as its library is loaded.
             let mut exports = unsafe { exports.read_unaligned() };
             engine.say(&format!("Relight: using {} instead\n", path.display()));
             *substitute() = Some(Substitute {

@@ -369,7 +369,7 @@ fn finish_still(
         return Ok(());
     };
     match renderer.still_progress() {
-        Some((done, wanted)) => outbox.lines.extend(shot.tell(done, wanted)),
+        Some((done, wanted)) => outbox.lines.extend(shot.progress(done, wanted)),
         // its map was unloaded
         None => front.captures.still = None,
     }
@@ -426,7 +426,7 @@ fn run_videos(engine: Engine) -> Result<(), Failure> {
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract). `encode_buffer` must be null or have room for `width * height *
-/// 4` bytes and **outlive the call**: during a frame, [`end_frame`] fills it or [`shutdown`] forgets it. A null buffer
+/// 4` bytes and **outlive the call**: during a frame, [`end_frame`] fills it or [`shutdown`] drops it. A null buffer
 /// or a side below 1 requests nothing. The capture buffer is not used.
 pub unsafe extern "C" fn take_video_frame(
     width: c_int,

@@ -108,7 +108,7 @@ impl Services for Ioq3 {
         let get = self.get(|t| t.Cvar_Get)?;
         // SAFETY: both strings live through the call; the engine copies them.
         let cvar = unsafe { get(name.as_ptr(), default.as_ptr(), flags) };
-        // SAFETY: null, or a `cvar_t` of the engine, which keeps its cvars for as long as the process lives.
+        // SAFETY: null, or a `cvar_t` of the engine, which keeps its cvars until the process ends.
         unsafe { Variable::new(cvar.cast()) }
     }
 
@@ -165,7 +165,7 @@ impl Services for Ioq3 {
     }
 
     fn cvar_integer(&self, name: &CStr) -> c_int {
-        // SAFETY: the name lives through the call.
+        // SAFETY: the name is valid during the call.
         self.get(|t| t.Cvar_VariableIntegerValue)
             .map_or(0, |f| unsafe { f(name.as_ptr()) })
     }
@@ -179,7 +179,7 @@ impl Services for Ioq3 {
 
     fn remove_command(&self, name: &CStr) {
         if let Some(f) = self.get(|t| t.Cmd_RemoveCommand) {
-            // SAFETY: the name lives through the call.
+            // SAFETY: the name is valid during the call.
             unsafe { f(name.as_ptr()) }
         }
     }
@@ -280,13 +280,13 @@ impl Services for Ioq3 {
     }
 
     fn home_file_exists(&self, name: &CStr) -> bool {
-        // SAFETY: the name lives through the call.
+        // SAFETY: the name is valid during the call.
         self.get(|t| t.FS_FileExists)
             .is_some_and(|f| unsafe { f(name.as_ptr()) } != 0)
     }
 
     fn play_cinematic(&self, name: &CStr) -> Option<c_int> {
-        // SAFETY: the name lives through the call. The size matters only for videos that the engine draws itself.
+        // SAFETY: the name is valid during the call. The size matters only for videos that the engine draws itself.
         let handle = self
             .get(|t| t.CIN_PlayCinematic)
             .map(|f| unsafe { f(name.as_ptr(), 0, 0, 256, 256, abi::CIN_MATERIAL) })?;

@@ -112,7 +112,7 @@ pub fn tessellate_patch(
 
 impl Bsp {
     /// The mesh of one surface before stitching. `None` when it is no patch or when its shader
-    /// reference says [`surface_flags::NODRAW`]: such patches are collision copies.
+    /// reference has [`surface_flags::NODRAW`]: such patches are collision copies.
     pub fn patch_mesh(&self, surface: &Surface, subdivisions: f32) -> Option<PatchMesh> {
         let hidden = self.shader(surface.shader).surface_flags & surface_flags::NODRAW != 0;
         if surface.kind != SurfaceKind::Patch || hidden {

@@ -7,7 +7,7 @@ use super::{MAX_GRID_SIZE, PatchMesh, normals};
 use crate::lumps::DrawVert;
 use glam::Vec3;
 
-/// Below this distance from the chord a middle column says nothing and is removed, id units.
+/// Below this distance from the chord a middle column is redundant and is removed, id units.
 const COLLINEAR: f32 = 0.1;
 
 /// Marks a column for removal in an error table.

@@ -230,7 +230,7 @@ impl QuakeMap {
                 }
                 let texture = usize::try_from(texinfo.texture).ok();
                 let texture = texture.and_then(|at| textures.get(at)?.as_ref());
-                // Coordinates of Quake II stay in texels until somebody tells the sizes.
+                // Coordinates of Quake II stay in texels until the sizes are set.
                 let size =
                     texture.map_or(Vec2::ONE, |t| Vec2::new(t.width as f32, t.height as f32));
                 if let Some(slot) = materials.get_mut(at) {
@@ -343,8 +343,8 @@ impl QuakeMap {
 
 impl Bsp {
     /// Turns coordinates that a format stores in texels ([`Bsp::texel_coordinates`]) into fractions of the texture,
-    /// once the sizes of textures are known: `size` is asked for the game path of each, without extension, and
-    /// answers width and height. A texture that it does not know is taken as 64 × 64.
+    /// once the sizes of textures are known: `size` gets the game path of each, without extension, and
+    /// returns width and height; `None` counts as 64 × 64.
     pub fn resolve_texture_sizes(&mut self, mut size: impl FnMut(&str) -> Option<(u32, u32)>) {
         if !std::mem::take(&mut self.texel_coordinates) {
             return;

@@ -13,13 +13,13 @@ use glam::{DVec3, Vec2, Vec3};
 /// Units of texture between two texels of a lightmap.
 const LUXEL: f64 = 16.0;
 
-/// Stored light of which our fixed scale has half: these formats show 128 (with Quake II's doubled textures 127) as
+/// Halves stored light, to our fixed scale: these formats show 128 (with Quake II's doubled textures 127) as
 /// the texture itself, `IBSP` shows 64 so.
 fn halved(byte: u8) -> u8 {
     byte / 2 + byte % 2
 }
 
-/// A face as a surface, before the surface knows where its vertices are.
+/// A face as a surface, before its vertices have an index.
 pub(super) struct Polygon {
     pub surface: Surface,
     pub layers: SurfaceLayers,

@@ -1,4 +1,4 @@
-//! How the formats draw their textures, said as materials: by the first letters of names in Quake, by flags in
+//! Converts the formats' drawing rules to materials: by the first letters of names in Quake, by flags in
 //! Quake II.
 
 use super::textures::{EmbeddedTexture, TextureUse, name_of, quake2_flags};
@@ -245,7 +245,7 @@ impl TextureUse {
             && self.parameters.is_empty()
     }
 
-    /// The material as a shader script, without its name; `None` when a bare picture says the same.
+    /// The material as a shader script, without its name; `None` if a bare picture is equivalent.
     fn script(&self) -> Option<String> {
         if self.is_plain() {
             return None;
@@ -324,7 +324,7 @@ impl TextureUse {
 
 impl Bsp {
     /// The shader script of a map that was converted from a format without scripts: what its engine did by names and
-    /// flags of textures, as materials. Empty for other maps. Materials that a bare picture says all about are left
+    /// flags of textures, as materials. Empty for other maps. Materials equivalent to a bare picture are left
     /// out.
     pub fn material_script(&self) -> String {
         let mut out = String::new();

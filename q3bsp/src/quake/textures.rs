@@ -104,8 +104,8 @@ impl EmbeddedTexture {
     }
 }
 
-/// A material of a converted map: a texture together with the way it is drawn, which Quake's formats tell by the first
-/// letter of its name and Quake II by flags.
+/// A material of a converted map: a texture together with the way it is drawn, which Quake's formats encode in the
+/// first letter of its name and Quake II in flags.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TextureUse {
@@ -155,7 +155,7 @@ fn known_parameters<'de, D: serde::Deserializer<'de>>(
     words.iter().map(known).collect()
 }
 
-/// What a texture name of 16 or 32 bytes says, lower case.
+/// A texture name of 16 or 32 bytes as text, lower case.
 pub(super) fn name_of(raw: &[u8]) -> String {
     let end = raw.iter().position(|&b| b == 0).unwrap_or(raw.len());
     let name = String::from_utf8_lossy(raw.get(..end).unwrap_or(raw));

@@ -8,7 +8,7 @@ use crate::format::Format;
 /// Most bytes of a matrix: 46,000 clusters. A map with more is taken as without visibility.
 const MAX_BYTES: usize = 256 << 20;
 
-/// Decodes one row: a byte that is not 0 stands for itself, a 0 for as many as the next byte says. `false` when the
+/// Decodes one row: a byte that is not 0 stands for itself, a 0 for as many as the next byte counts. `false` when the
 /// data ends before the row does.
 fn decode_row(mut data: &[u8], row: &mut [u8]) -> bool {
     let mut at = 0;
@@ -60,7 +60,7 @@ impl QuakeMap {
         usize::try_from(count).ok()
     }
 
-    /// Where the row of a cluster begins in the lump; `None` when the cluster sees everything.
+    /// Where the row of a cluster begins in the lump; `None` if the cluster sees all clusters.
     fn row_start(&self, cluster: usize) -> Option<usize> {
         let offset = match self.format {
             Format::Quake2 | Format::Qbism => {

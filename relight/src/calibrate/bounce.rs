@@ -32,7 +32,8 @@ const SAME_NORMAL: f32 = 0.7;
 /// Transfer matrix from light at samples to reflected light at samples.
 #[derive(Clone)]
 pub(super) struct Transfer {
-    /// For each sample: the samples that stand for what it sees, and the part of their light that arrives here.
+    /// For each sample: the samples that represent the surfaces hit by its rays, and the part of their light that
+    /// arrives.
     rows: Vec<Vec<(u32, Vec3)>>,
     /// Radiance of sky images that are in no light list, averaged over the hemisphere.
     skies: Vec<Vec3>,

@@ -159,8 +159,8 @@ pub(super) fn find(
     vec![found]
 }
 
-/// The settings of a command line, with and without its dirt: some maps do not look as their command line says, and
-/// trials mistake missing lights for dirt.
+/// The settings of a command line, with and without its dirt: stored light of some maps contradicts the command line,
+/// and trials mistake missing lights for dirt.
 fn from_command_line(line: CommandLine) -> Vec<Compiler> {
     let with = |dirt| Compiler {
         gamma: line.gamma,

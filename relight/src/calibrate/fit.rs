@@ -213,12 +213,12 @@ impl Fit<'_> {
         let known = self.columns.len();
         self.columns.extend(splashes);
         self.settle();
-        let believed = self.agreement().median_stops < without * SPLASHES_KEPT;
+        let kept = self.agreement().median_stops < without * SPLASHES_KEPT;
         let residual = solve::residual(&self.samples, &self.columns, self.ambient.value);
         placement::drop_useless(&mut self.columns, known, &residual, placement::WORTH);
         let splashes = self.columns.split_off(known);
         self.restore(state);
-        let added = believed && !splashes.is_empty();
+        let added = kept && !splashes.is_empty();
         if added {
             self.columns.extend(splashes);
         }

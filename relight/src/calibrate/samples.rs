@@ -138,11 +138,11 @@ pub(super) fn is_measurable(world: &RelitWorld, surface: &WorldSurface) -> bool 
 
 /// Area of measurable surfaces, square id units.
 fn area(world: &RelitWorld, is: fn(&WorldSurface) -> bool) -> f64 {
-    let told = world
+    let measurable = world
         .surfaces
         .iter()
         .filter(|s| is(s) && is_measurable(world, s));
-    let triangles = told.flat_map(|surface| surface.triangles());
+    let triangles = measurable.flat_map(|surface| surface.triangles());
     let areas = triangles.filter_map(|triangle| {
         let [a, b, c] = world.triangle(triangle)?;
         Some(f64::from((b - a).cross(c - a).length() * 0.5)).filter(|area| area.is_finite())
@@ -280,7 +280,7 @@ pub(super) fn sample_at(
     if cluster < 0 || world.bsp.is_in_drawn_brush(position, INSIDE) {
         return None;
     }
-    // A position that sees back faces in most directions lies inside something.
+    // A position from which most rays hit back faces lies inside something.
     let (u, v) = normal.any_orthonormal_pair();
     let around = [normal, normal + u, normal - u, normal + v, normal - v];
     let is_back = |ray: &Vec3| {

@@ -1,6 +1,6 @@
 //! Skies without directives, as lights.
 //!
-//! Where no directive gives a sky's light, bounce rays see its image, whose brightness says nothing about the
+//! Where no directive gives a sky's light, bounce rays hit its image, whose brightness is unrelated to the
 //! compiler's light. Calibration adds such skies to the light lists with an unknown strength, which the fit decides
 //! and which is often zero.
 

@@ -1,8 +1,8 @@
 //! Search for a sun without a directive.
 //!
-//! A sun leaves a unique pattern: the cosine to one direction wherever that direction sees sky, and nothing in
-//! shadow. Directions over the upper hemisphere are tried against the residual of the known lights, and the best
-//! one is refined.
+//! A sun leaves a unique pattern: the cosine to one direction wherever a ray in that direction reaches the sky, and
+//! nothing in shadow. Directions over the upper hemisphere are tried against the residual of the known lights, and the
+//! best one is refined.
 
 use super::columns::{Column, Source, sun_rows};
 use super::samples::Sample;

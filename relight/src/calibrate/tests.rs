@@ -125,7 +125,7 @@ fn room_of(material: &str, lamp: bool, light: Option<&dyn Fn(Vec3, Vec3) -> Vec3
     relit(&room_map(material, lamp, usize::MAX, light).build())
 }
 
-/// Its map, of which the first so many faces are lightmapped.
+/// Its map. `lightmapped`: number of faces with a lightmap, the first ones.
 fn room_map(
     material: &str,
     lamp: bool,
@@ -175,7 +175,7 @@ fn room_map(
     map
 }
 
-/// A world whose stored light has the colours that it says.
+/// A world whose stored light has its stored colours.
 fn relit(bsp: &Bsp) -> RelitWorld {
     relit_as(bsp, LightColor::Stored)
 }
@@ -271,7 +271,7 @@ fn hidden_lights_are_found_again() {
     let total: Vec3 = world.point_lights.iter().map(|l| l.intensity).sum();
     let hidden: Vec3 = HIDDEN.iter().map(|(_, i)| *i).sum();
     assert!((total / hidden - 1.0).abs().max_element() < 0.1, "{total}");
-    // The lists know them: all of the room is one cluster.
+    // They are in the lists: all of the room is one cluster.
     assert_eq!(world.light_lists.row(0).len(), world.point_lights.len());
     assert_eq!(world.report.point_lights, world.point_lights.len());
 }

@@ -1,4 +1,4 @@
-//! FLIP: how visible the differences between two pictures are to somebody who flips between them.
+//! FLIP: how visible the differences between two pictures are to an observer who flips between them.
 //!
 //! After Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström and Fairchild, "FLIP: a difference evaluator for
 //! alternating images" (2020), for pictures of ordinary dynamic range; numbers in comments are the paper's sections.

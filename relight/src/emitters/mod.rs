@@ -39,7 +39,7 @@
 //! radiance.
 //!
 //! The numbers are a prior. Compilers have options (`-areascale`, `-pointscale`, gamma) that leave no trace
-//! in the map. Colours of directives are raised as [`LightColor`] says.
+//! in the map. [`LightColor`] is the exponent of directives' colours.
 //!
 //! Source: the constants are the defaults of q3map2 (area scale 0.25, point scale 7500, sky scale 1); the
 //! units are written out here.
@@ -78,8 +78,9 @@ pub const AMBIENT_RADIANCE: f32 = 4.0 / 255.0;
 
 /// Factor that the compiler applied to light before storing it, from `q3map_lightmapBrightness`; 1 by default.
 /// Bounded to 1/64..64, the range of bytes.
-pub fn stored_scale(says: Option<f32>) -> f32 {
-    says.filter(|scale| *scale > 0.0 && scale.is_finite())
+pub fn stored_scale(directive: Option<f32>) -> f32 {
+    directive
+        .filter(|scale| *scale > 0.0 && scale.is_finite())
         .map_or(1.0, |scale| scale.clamp(1.0 / 64.0, 64.0))
 }
 
@@ -147,7 +148,7 @@ pub struct PointLight {
     pub origin: Vec3,
     /// Radiant intensity, linear; see the [module](self) for its unit.
     pub intensity: Vec3,
-    /// Radius of the ball that it is drawn from, for soft shadows, id units. The compiler knows none:
+    /// Radius of the sampled sphere, for soft shadows, id units. The compiler uses a point:
     /// this is a choice ([`DEFAULT_POINT_LIGHT_RADIUS`]).
     pub radius: f32,
     /// The cone that it shines into; `None` for all directions.
@@ -173,7 +174,7 @@ pub enum Falloff {
 }
 
 impl Falloff {
-    /// Irradiance for an intensity of 1, of a surface that sees the light at a distance (id units) and under a cosine.
+    /// Irradiance for an intensity of 1, on a surface at a distance (id units) with a cosine of incidence.
     ///
     /// A linear light gives N cosθ − f d, with N its light up close: with the reach R = N / f and the intensity
     /// I = N R² / 8 that is 8 I / R² (cosθ − d / R). Source: what q3map2's documentation calls `spawnflags 1` and `fade`.

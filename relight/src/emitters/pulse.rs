@@ -81,7 +81,7 @@ mod tests {
     use shaderscript::WaveFunction;
 
     #[test]
-    fn strength_is_told_about_its_mean() {
+    fn strength_is_relative_to_its_mean() {
         let wave = Wave {
             function: WaveFunction::Square,
             base: 0.25,

@@ -8,7 +8,7 @@ use shaderscript::{
     AlphaGen, Cull, Deform, DepthFunc, RgbGen, Shader, Stage, StageImage, TcGen, TcMod, Wave,
 };
 
-/// A material: its flags in the map and everything that its script says.
+/// A material: its flags in the map and the content of its script.
 pub fn material(material: &WorldMaterial) -> Value {
     let shader = &material.resolved.shader;
     let mut out = json!({
@@ -47,7 +47,7 @@ pub fn material(material: &WorldMaterial) -> Value {
     out
 }
 
-/// What a script says outside its stages; what is at its default is left out.
+/// Keywords of a script outside its stages, without those at their defaults.
 fn directives(shader: &Shader, map: &mut Map<String, Value>) {
     let mut put = |key: &str, value: Value| {
         map.insert(key.to_owned(), value);

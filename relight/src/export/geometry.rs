@@ -25,7 +25,7 @@ pub enum Drawn {
     No,
 }
 
-/// Whether a material is drawn. What the map's own flags hide stays hidden whatever its script says.
+/// Whether a material is drawn. The map's flags hide it whatever its script contains.
 pub fn drawn(material: &WorldMaterial) -> Drawn {
     let hidden = surface_flags::NODRAW | surface_flags::HINT | surface_flags::SKIP;
     if material.is_sky() {
@@ -267,7 +267,7 @@ fn rises(world: &RelitWorld, indices: &[u32], stacked: Stacked) -> BTreeMap<u32,
     rises
 }
 
-/// Joins triangles that are no map's, without those that have no area or coordinates that are no numbers, and tells how
+/// Joins triangles of models, without those that have no area or non-finite coordinates; also returns how
 /// many these are. The part's material is 0.
 pub fn join(triangles: impl Iterator<Item = [WorldVertex; 3]>) -> (Part, usize) {
     let mut joiner = Joiner::default();

@@ -126,9 +126,9 @@ type Found = Option<Arc<Encoded>>;
 
 #[derive(Default)]
 struct Kept {
-    /// Means of images that nobody has asked for as files.
+    /// Means of images that were not requested as files.
     means: HashMap<String, Option<Vec4>>,
-    /// Image, and when it was last asked for.
+    /// Image, and time of its last request.
     images: HashMap<Picture, (Found, u64)>,
     bytes: usize,
     clock: u64,
@@ -324,7 +324,8 @@ fn mime_of(path: &str) -> Option<Mime> {
     }
 }
 
-/// Whether a file is what its extension says and has 8 bits a channel of grey, RGB or RGBA, which every program reads.
+/// Whether a file's content matches its extension and has 8 bits a channel of grey, RGB or RGBA, which every program
+/// reads.
 fn is_plain(bytes: &[u8], mime: Mime) -> bool {
     let format = match mime {
         Mime::Png => ::image::ImageFormat::Png,

@@ -191,12 +191,12 @@ impl<'a> Layer<'a> {
             look.alpha = Alpha::Blend;
         }
         let two_sided = look.two_sided;
-        let mut told = |what: &str| look.lost.push(format!("stage {number}: {what}"));
+        let mut report = |what: &str| look.lost.push(format!("stage {number}: {what}"));
         if how.is_inverse() && !opaque {
-            told("covers what its alpha leaves; said for its image's alpha as it is");
+            report("covers what its alpha leaves; said for its image's alpha as it is");
         }
         if two_sided {
-            told("covers both sides; it is on the front alone");
+            report("covers both sides; it is on the front alone");
         }
     }
 

@@ -1,12 +1,12 @@
 //! A material as far as other programs can say it: one image for colour, one for glow, transparency, refraction.
 //!
-//! The stages are told apart by what they do, as everywhere ([`crate::materials::light`]). Those whose images lie on the
+//! Stages are classified by their effect, as in [`crate::materials::light`]. Those whose images lie on the
 //! surface in the same way become one picture; of what moves against that, the brightest addition is kept as glow and
-//! the rest is told in [`Look::lost`].
+//! the rest is reported in [`Look::lost`].
 
 use super::film::Film;
 use super::layers::draws_nothing;
-use super::losses::told_losses;
+use super::losses::report_losses;
 use super::stack::{self, Moment, Part, tiling};
 use crate::materials::light::{
     LightLinear, SurfaceClass, base_stage, cut_out_stage, glow_stages, refraction_index,
@@ -141,7 +141,7 @@ pub struct Look {
     pub mirror: bool,
     /// Roughness, 0..1.
     pub roughness: f32,
-    /// What of it could not be said.
+    /// Properties that the format cannot represent.
     pub lost: Vec<String>,
 }
 
@@ -231,7 +231,7 @@ pub fn look(
     if look.mirror {
         look.roughness = 0.0;
     }
-    told_losses(shader, &mut look.lost);
+    report_losses(shader, &mut look.lost);
     if !material.baked.styles.is_empty() {
         let styles = material.baked.styles.len();
         look.lost.push(format!(
@@ -350,7 +350,7 @@ pub fn look(
     look
 }
 
-/// The stages that lie on the surface as the base stage does; what becomes of the others is told in `lost`.
+/// The stages that lie on the surface as the base stage does; the treatment of the others is reported in `lost`.
 fn group_of(shader: &Shader, base: usize, stage: &Stage, lost: &mut Vec<String>) -> Vec<usize> {
     let mut group = Vec::new();
     let drawn = |(_, s): &(usize, &Stage)| !draws_nothing(s);
@@ -398,8 +398,8 @@ pub fn ratio(now: Vec3, usual: Vec3) -> Vec3 {
     Vec3::select(known, part, Vec3::ONE)
 }
 
-/// How a stage by itself hides what is behind it, and the change of its alpha that this needs; `None` for what only
-/// its whole stack can tell.
+/// How a stage by itself hides what is behind it, and the change of its alpha that this needs; `None` if only
+/// its whole stack determines that.
 fn plain_blend(stage: &Stage) -> Option<(Alpha, Option<Edit>)> {
     use BlendFactor::{DstColor, OneMinusSrcAlpha, SrcAlpha, SrcColor, Zero};
     match (stage.alpha_func, stage.blend) {
@@ -470,8 +470,8 @@ fn add_moving_glow(
             tc_mods: stage.tc_mods.clone(),
         });
         look.glow_factor = stack::color_of(stage, moment).truncate();
-        let told = format!("stage {i}: ");
-        look.lost.retain(|l| !l.starts_with(&told));
+        let prefix = format!("stage {i}: ");
+        look.lost.retain(|l| !l.starts_with(&prefix));
     }
 }
 

@@ -2,15 +2,15 @@
 
 use shaderscript::{AlphaGen, Deform, RgbGen, Shader, StageImage, TcMod};
 
-/// End of what is told of a stage whose images follow each other.
+/// End of the message about a stage with animated images.
 pub const FILM: &str = "its images follow each other; the first is shown";
-/// End of what is told of a stage with a wave for its colour or alpha.
+/// End of the message about a stage with a wave for its colour or alpha.
 pub const PULSE: &str = "its brightness changes; the mean is shown";
-/// End of what is told of a stage with a wave in its texture coordinates.
+/// End of the message about a stage with a wave in its texture coordinates.
 pub const WOBBLE: &str = "its texture wobbles";
 
 /// Adds what no format here can say of a material.
-pub fn told_losses(shader: &Shader, lost: &mut Vec<String>) {
+pub fn report_losses(shader: &Shader, lost: &mut Vec<String>) {
     for deform in &shader.deforms {
         lost.push(
             match deform {

@@ -100,7 +100,7 @@ pub enum Lightmaps {
     /// lightmaps are there with their coordinates, unused.
     #[default]
     Vertices,
-    /// Materials are lit by lightmaps, for programs that know these.
+    /// Materials are lit by lightmaps, for programs that support them.
     Keep,
     /// Left out, for programs that compute light themselves.
     Strip,
@@ -160,7 +160,7 @@ pub struct ExportOptions {
     pub images: ImagePlace,
     /// How sides of brushes say how their textures lie.
     pub brushes: Brushes,
-    /// Whether lights that the format knows (points, spots, suns) are written, and lamps glow as strongly as the light
+    /// Whether lights of the format's kinds (points, spots, suns) are written, and lamps glow as strongly as the light
     /// that they are. With lightmaps all light is there twice.
     pub lights: bool,
     /// What all light is multiplied by; the map's own [`display_exposure`](RelitWorld::display_exposure) where it
@@ -223,7 +223,7 @@ pub enum ExportError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// More than the format can hold.
@@ -249,7 +249,7 @@ pub enum ExportError {
     Image {
         /// Name of the image.
         name: String,
-        /// What the encoder said.
+        /// Error of the encoder.
         reason: String,
     },
 }
@@ -269,14 +269,14 @@ pub struct ExportReport {
     pub materials: usize,
     /// Images.
     pub images: usize,
-    /// What could not be said in the format, each thing once; and the world's own warnings.
+    /// Properties that the format cannot represent, each once, and the world's own warnings.
     pub warnings: Vec<String>,
 }
 
 /// Writes a map to `path`, and the files that belong to it beside it.
 ///
 /// All files are written under other names first and renamed when everything has been written, the named one last: a
-/// reader never sees half a file.
+/// reader never opens a partial file.
 ///
 /// # Errors
 /// [`ExportError`] when the format cannot hold the map or a file cannot be written; then nothing is left behind.

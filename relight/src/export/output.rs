@@ -28,7 +28,7 @@ impl Output {
         }
     }
 
-    /// The file that was asked for.
+    /// The requested file.
     pub fn main(&self) -> &Path {
         &self.main
     }
@@ -40,7 +40,7 @@ impl Output {
             .map_or_else(|| "map".to_owned(), |s| s.to_string_lossy().into_owned())
     }
 
-    /// Writes the file that was asked for.
+    /// Writes the requested file.
     ///
     /// # Errors
     /// [`ExportError::Write`].
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_written_is_told_with_its_place() {
+    fn an_error_of_writing_names_the_file() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("file");
         fs::write(&file, "").unwrap();

@@ -60,7 +60,7 @@ pub fn make_shown_as(look: &mut Look, light: Vec3, glows: bool) -> bool {
                 show(glow);
             }
             _ => {
-                look.lost.push(told(&picture));
+                look.lost.push(film_message(&picture));
                 return true;
             }
         },
@@ -75,7 +75,7 @@ pub fn make_shown_as(look: &mut Look, light: Vec3, glows: bool) -> bool {
     false
 }
 
-fn told(glow: &Slot) -> String {
+fn film_message(glow: &Slot) -> String {
     let what = match &glow.picture {
         Picture::File(name) | Picture::Edited(name, _) => format!(" of {name}"),
         Picture::Baked { .. } | Picture::Film(_) | Picture::Sky { .. } | Picture::Panorama(_) => {

@@ -33,7 +33,7 @@ pub fn picture(files: &dyn GameFiles, material: &WorldMaterial, side: usize) -> 
     })
 }
 
-/// What the script says, unless it is not drawn.
+/// The script's definition, if it is drawn.
 pub fn definition(material: &WorldMaterial) -> &Shader {
     let resolved = &material.resolved;
     match &resolved.script {

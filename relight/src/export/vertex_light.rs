@@ -1,4 +1,4 @@
-//! Light of lightmaps in the colours of vertices, for programs that know no lightmaps.
+//! Light of lightmaps in the colours of vertices, for programs without lightmaps.
 //!
 //! A vertex does not get the light of its own place, which may be a dark corner of a large bright floor: the colours
 //! are those whose interpolation over the triangles comes closest to the lightmap everywhere.

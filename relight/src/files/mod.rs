@@ -35,7 +35,7 @@ pub enum FileError {
     Io {
         /// The file or folder on disk.
         path: String,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// A `.pk3` is not a zip archive that can be read.
@@ -43,7 +43,7 @@ pub enum FileError {
     Pack {
         /// The archive on disk.
         pack: String,
-        /// What the zip reader said.
+        /// Error of the zip reader.
         reason: String,
     },
     /// One entry of a `.pk3` cannot be read: damaged, encrypted, or of an unknown method.
@@ -53,7 +53,7 @@ pub enum FileError {
         pack: String,
         /// The entry's name as stored.
         name: String,
-        /// What the zip reader said.
+        /// Error of the zip reader.
         reason: String,
     },
     /// A file is larger than [`MAX_FILE_BYTES`].
@@ -67,7 +67,7 @@ pub enum FileError {
     /// A game path that would leave the game folder, or cannot name a file at all.
     #[error("{path:?}: not a path inside the game folder")]
     Refused {
-        /// The path as asked for.
+        /// The requested path.
         path: String,
     },
 }

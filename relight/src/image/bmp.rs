@@ -1,7 +1,7 @@
 //! Windows bitmaps: uncompressed, 8 bits with a palette, 16 (X1R5G5B5), 24 or 32 bits with alpha.
 //!
-//! The engine knows no padding of rows to four bytes, so it shears pictures of odd widths; here rows
-//! are padded as the format says when the file is long enough for it. A negative height (top row
+//! The engine ignores the padding of rows to four bytes, so it shears pictures of odd widths; here rows
+//! are padded as in the format if the file is long enough for it. A negative height (top row
 //! first) is honoured.
 //!
 //! Source: Microsoft's BITMAPFILEHEADER and BITMAPINFOHEADER.

@@ -50,7 +50,7 @@ fn tga_agrees_with_the_oracle() {
                 encoder
                     .write_image(image.as_bytes(), width, height, image.color().into())
                     .unwrap();
-                // The encoder writes rows from the top and says so. What it says is ignored here, so
+                // The encoder writes rows from the top and sets the flag for it. The reader ignores the flag, so
                 // the picture comes out upside down.
                 assert_eq!(bytes[17] & 0x20, 0x20);
                 let ours = decode("x.tga", "tga", &bytes).unwrap();

@@ -1,5 +1,5 @@
 //! Targa, as the engine reads it: types 2, 3 and 10, 24 or 32 bits (8 for grey), never a colour map,
-//! always bottom row first whatever the descriptor's top-down bit says.
+//! always bottom row first whatever the descriptor's top-down bit is.
 //!
 //! Source: Truevision TGA 2.0 specification; the bit's treatment is ioquake3's.
 
@@ -42,7 +42,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Image, Fault> {
     let body = bytes
         .get(HEADER + usize::from(id_length)..)
         .ok_or("TGA header cut short")?;
-    // What is missing shows before memory for the pixels is asked for: a run covers at most 128 pixels.
+    // Checks the length before allocating the pixels: a run covers at most 128 pixels.
     let least = if kind == TRUE_COLOUR_RLE {
         pixels.div_ceil(128) * (1 + depth)
     } else {

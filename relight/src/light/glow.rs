@@ -281,7 +281,7 @@ mod tests {
     use super::*;
     use shaderscript::parse_script;
 
-    /// The shades of a material of which the picture `e` has a black and a white half, and `a` is grey with holes of a
+    /// The shades of a material: its picture `e` has a black and a white half, and `a` is grey with holes of a
     /// quarter.
     fn shades_of(body: &str, lighting: ImplicitKind, corners: [u8; 4]) -> Vec<Shade> {
         let script = parse_script("test", format!("t\n{{\n{body}\n}}\n").as_bytes());
@@ -319,7 +319,7 @@ mod tests {
         let metal = format!("{{\n{PICTURE}\n}}\n{PAINT}\n{LIGHT}");
         let found = shades_of(&metal, ImplicitKind::Lightmapped, [255; 4]);
         near(means(&found), (0.25 * 0.5 + 0.75 * 0.5, 0.25 * 0.5));
-        // its halves are as far apart as the paint lets them be
+        // its halves differ as much as the paint permits
         let ends = [found.first().unwrap(), found.last().unwrap()].map(|s| s.encoded.x);
         assert!((ends[1] - ends[0] - 0.25).abs() < 5e-3, "{ends:?}");
         // what no light reaches is a mirror alone

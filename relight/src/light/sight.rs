@@ -75,7 +75,7 @@ pub(super) fn furthest_in_front(bounds: Aabb, normal: Vec3, dist: f32) -> f32 {
 /// Cluster lookup and visibility of a map.
 #[derive(Debug, Clone, Default)]
 pub struct Sight {
-    /// Number of clusters; 0 for a map without a visibility matrix: there everything sees everything.
+    /// Number of clusters; 0 for a map without a visibility matrix, where all positions are mutually visible.
     count: usize,
     /// For every cluster those that it sees or is seen from: compilers write matrices that are not symmetric, and
     /// light travels both ways.
@@ -192,7 +192,7 @@ mod tests {
 
     #[test]
     fn a_point_is_in_the_cluster_of_its_leaf() {
-        // leafs: 0 in solid, 1 above in cluster 0, 2 below in cluster 5, of which there are but two
+        // leafs: 0 in solid, 1 above in cluster 0, 2 below in cluster 5, which does not exist
         let mut sight = Sight {
             count: 2,
             sees: vec![ClusterSet::all(2); 2],

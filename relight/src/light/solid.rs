@@ -1,6 +1,6 @@
 //! Tests whether a ray passes through the solid of a map.
 //!
-//! Compilers draw no surface where nobody can look from: behind panels, under curves, outside the hull. A ray from
+//! Compilers drop surfaces that no player can see: behind panels, under curves, outside the hull. A ray from
 //! there meets no triangle on its way through a wall. The BSP tree still marks the wall: its leafs belong to no
 //! cluster.
 

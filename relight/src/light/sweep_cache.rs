@@ -311,7 +311,7 @@ t/wall
             .into_iter()
             .find(|p| *p != path)
             .unwrap();
-        // damage that keeps the hash right: only what the file says is wrong
+        // damage with a correct hash: only the content is wrong
         let signed = |change: &dyn Fn(&mut Vec<u8>)| {
             let mut bytes = whole[..whole.len() - END].to_vec();
             change(&mut bytes);

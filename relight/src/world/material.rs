@@ -22,8 +22,8 @@ pub struct WorldMaterial {
     pub content_flags: u32,
     /// How its surfaces are lit where the material itself leaves it open.
     pub lighting: ImplicitKind,
-    /// What is drawn, what the script says, and what is wrong. Of baked light its stages have one `$lightmap` stage at the
-    /// most: the rest is in `baked`.
+    /// What is drawn, the script's definition, and faults. Its stages have at most one `$lightmap` stage; further
+    /// baked light is in `baked`.
     pub resolved: Resolved,
     /// Where its baked light lies, beside the pages of its surfaces.
     pub baked: BakedPages,
@@ -35,7 +35,7 @@ pub struct WorldMaterial {
     /// What it throws back of light all over its texture, from dark to bright, equal parts of it each; without
     /// [`stored_scale`](Self::stored_scale). Empty of skies, and unless the world was loaded to be calibrated.
     pub shades: Vec<Shade>,
-    /// Where light passes a cut-out; `None` of other materials, where nobody knows, and unless the world was loaded to be
+    /// Where light passes a cut-out; `None` for other materials, if unknown, and unless the world was loaded to be
     /// calibrated.
     pub holes: Option<Arc<Holes>>,
     /// Mean radiance of what it shows of its own, linear: of a sky its picture. Bounced rays find it where it is in no
@@ -83,9 +83,9 @@ impl WorldMaterial {
     /// The author wanted such surfaces darker or brighter than their light: the factor is part of the
     /// [`albedo`](Self::albedo), not of the light.
     pub fn stored_scale(&self) -> f32 {
-        let says = self.resolved.definition().light.lightmap_brightness;
+        let directive = self.resolved.definition().light.lightmap_brightness;
         let lightmapped = self.lighting == ImplicitKind::Lightmapped;
-        emitters::stored_scale(says.filter(|_| lightmapped))
+        emitters::stored_scale(directive.filter(|_| lightmapped))
     }
 
     /// Whether the map's flags or the script make it sky.

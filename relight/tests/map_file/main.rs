@@ -329,7 +329,7 @@ fn a_file_saved_by_an_editor_is_the_map() {
     let ours = agreement(&text, &world);
     let found = agreement(&std::fs::read_to_string(file).unwrap(), &world);
     println!("{map}: {found:?}");
-    // Editors write textures in texels, which says nothing without the images.
+    // Editors write projections in texels, which are unknown without the images.
     let without = |a: Agreement| Agreement { aligned: 0, ..a };
     assert_eq!(without(found), without(ours));
 }

@@ -1,5 +1,5 @@
 //! A reader of `.map` files with brushes in either form and patches, as a compiler reads them: planes from three points,
-//! textures from what the line says.
+//! textures from the numbers of the line.
 
 use glam::{DVec2, DVec3};
 

@@ -22,9 +22,9 @@ pub(super) struct Uploaded {
 /// Factor by which the map compiler scaled the light on a material before storing it. The traced look scales the
 /// reflectance by it.
 fn lit_scale(material: &Material) -> f32 {
-    let says = material.shader.light.lightmap_brightness;
+    let directive = material.shader.light.lightmap_brightness;
     let lightmapped = material.lightmap_class == LightmapClass::Page;
-    relight::light::stored_scale(says.filter(|_| lightmapped))
+    relight::light::stored_scale(directive.filter(|_| lightmapped))
 }
 
 impl Materials {

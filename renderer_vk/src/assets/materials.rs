@@ -249,8 +249,8 @@ impl Materials {
     /// Logs the engine's warnings about a script when its first material is made.
     fn tell_warnings(&self, shader: &Shader) {
         let class = |class| (shader.name.to_ascii_lowercase(), class);
-        let told = |c: &LightmapClass| self.by_key.contains_key(&class(*c));
-        if LightmapClass::ALL.iter().any(told) {
+        let has = |c: &LightmapClass| self.by_key.contains_key(&class(*c));
+        if LightmapClass::ALL.iter().any(has) {
             return;
         }
         for warning in self.scripts.library().warnings_of(shader) {
@@ -519,7 +519,7 @@ impl Materials {
         self.last_sun
     }
 
-    /// Forgets the sun of parsed materials, before a map is loaded.
+    /// Drops the sun of parsed materials, before a map is loaded.
     pub fn forget_sun(&mut self) {
         self.last_sun = None;
     }

@@ -85,7 +85,7 @@ pub(crate) struct BufferInner {
 /// The mapped bytes of a buffer.
 #[derive(Clone, Copy)]
 pub(crate) struct Mapped(NonNull<u8>);
-// SAFETY: the pointer is to memory that lives as long as its owner and is only read and written through `write`,
+// SAFETY: the pointer is to memory that is valid as long as its owner and is only read and written through `write`,
 // `read` (which take the owner's lock) and the arena (which borrows itself mutably).
 unsafe impl Send for Mapped {}
 // SAFETY: as above.

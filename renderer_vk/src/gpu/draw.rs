@@ -131,7 +131,7 @@ impl Pass<'_> {
             .framebuffer(framebuffer)
             .render_area(extent.into())
             .clear_values(&clears[..count]);
-        // SAFETY: recording outside of a render pass; the framebuffer lives until this frame is over.
+        // SAFETY: recording outside of a render pass; the framebuffer stays valid until this frame is over.
         unsafe {
             self.vk()
                 .cmd_begin_render_pass(self.cmd(), &info, vk::SubpassContents::INLINE);

@@ -45,7 +45,7 @@ pub(crate) struct SyncState {
 }
 
 impl SyncState {
-    /// The tag of an object dropped now; `pending` says whether uploads wait for the next submission.
+    /// The tag of an object dropped now; `pending`: uploads wait for the next submission.
     pub fn tag(&self, pending: bool) -> u64 {
         if self.recording || self.immediates > 0 || pending {
             self.submitted + 1

@@ -30,7 +30,7 @@ mod tests {
 
     /// Anonymous memory of this process, megabytes.
     fn anonymous() -> u64 {
-        let status = std::fs::read_to_string("/proc/self/status").expect("Linux says");
+        let status = std::fs::read_to_string("/proc/self/status").expect("Linux has it");
         let line = status.lines().find_map(|l| l.strip_prefix("RssAnon:"));
         let number = line.and_then(|l| l.split_whitespace().next()?.parse::<u64>().ok());
         number.expect("kilobytes") >> 10

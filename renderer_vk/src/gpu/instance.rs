@@ -31,7 +31,7 @@ impl<'a> SurfaceSource<'a> {
     ///
     /// # Safety
     /// `get_instance_proc_addr` must be the entry point of a Vulkan loader that stays in memory for as long as the
-    /// device lives, and `create` must return a surface made with the instance that it is given.
+    /// device exists, and `create` must return a surface made with the instance that it is given.
     pub unsafe fn window(
         get_instance_proc_addr: vk::PFN_vkGetInstanceProcAddr,
         extensions: Vec<CString>,
@@ -110,7 +110,7 @@ impl Instance {
             // Receives messages of the layer during the instance's creation and destruction.
             info = info.push_next(&mut debug_info);
         }
-        // SAFETY: every pointer in `info` lives in this function, names are NUL-terminated.
+        // SAFETY: every pointer in `info` is valid in this function, names are NUL-terminated.
         let raw = unsafe { entry.create_instance(&info, None) }.map_err(|result| match result {
             vk::Result::ERROR_INCOMPATIBLE_DRIVER => {
                 Error::NoDevice("the loader found no driver".to_owned())

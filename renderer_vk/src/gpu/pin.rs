@@ -85,7 +85,7 @@ mod tests {
 
     #[test]
     fn finds_this_program() {
-        let maps = std::fs::read("/proc/self/maps").expect("Linux tells");
+        let maps = std::fs::read("/proc/self/maps").expect("Linux has it");
         let here = finds_this_program as fn() as usize as u64;
         let exe = std::env::current_exe().expect("a path");
         use std::os::unix::ffi::OsStrExt;

@@ -92,7 +92,7 @@ impl SlotResources {
         unsafe { self.device.vk().end_command_buffer(self.before) }.context("vkEndCommandBuffer")
     }
 
-    /// Ends the main command buffer; with `host_reads`, the CPU sees all writes after the submission.
+    /// Ends the main command buffer; with `host_reads`, all writes are visible to the CPU after the submission.
     pub fn finish(&self, host_reads: bool) -> Result<(), Error> {
         let vk = self.device.vk();
         if !host_reads {
@@ -140,7 +140,7 @@ pub(crate) struct Acquired {
     pub finished: vk::Semaphore,
 }
 
-/// While it lives, a frame is being recorded.
+/// While it exists, a frame is being recorded.
 pub(crate) struct Recording(pub Device);
 
 impl Drop for Recording {

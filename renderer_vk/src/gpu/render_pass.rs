@@ -82,7 +82,7 @@ impl DeviceInner {
         Ok(pass)
     }
 
-    /// The framebuffer for `key`. It lives as long as its views.
+    /// The framebuffer for `key`. It exists as long as its views.
     pub fn framebuffer(&self, key: FramebufferKey) -> Result<vk::Framebuffer, Error> {
         let mut framebuffers = lock(&self.framebuffers);
         if let Some((_, made)) = framebuffers.iter().find(|(known, _)| *known == key) {

@@ -492,7 +492,7 @@ mod tests {
         let extensions = [ash::khr::surface::NAME, ash::ext::headless_surface::NAME]
             .map(CString::from)
             .to_vec();
-        // SAFETY: `entry` lives to the end of the process (see below); the surface is of the given instance.
+        // SAFETY: `entry` is valid to the end of the process (see below); the surface is of the given instance.
         let source = unsafe {
             SurfaceSource::window(
                 entry.static_fn().get_instance_proc_addr,

@@ -22,7 +22,7 @@ impl Window {
     ///
     /// # Safety
     /// `get_instance_proc_addr` must be `vkGetInstanceProcAddr` of a Vulkan loader that stays in memory for as long
-    /// as the renderer lives; `create` must return a surface made with the instance that it is given; the window
+    /// as the renderer exists; `create` must return a surface made with the instance that it is given; the window
     /// must outlive the renderer.
     pub unsafe fn new(
         get_instance_proc_addr: *const c_void,

@@ -48,7 +48,7 @@ pub struct AccelOutput {
     pub first_person: bool,
 }
 
-/// Bytes of the acceleration structures, by content. Memory that lives for one frame is that of the last frame.
+/// Bytes of the acceleration structures, by content. Memory used for one frame is that of the last frame.
 #[cfg(test)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AccelMemory {

@@ -1,7 +1,7 @@
 //! Coplanar triangles of the map that face opposite ways.
 //!
 //! Maps have them where one surface draws a liquid from above and another from below, each one-sided. A ray meets both
-//! at the same distance, and rounding decides which of the two it reports: if the ray reports the one that it sees from
+//! at the same distance, and rounding decides which of the two it reports: if the ray reports the one that it hits from
 //! behind, it continues and misses the other. Therefore the sides of such triangles are tested during traversal, which
 //! costs one test per hit; other triangles need no such test.
 

@@ -138,11 +138,11 @@ mod tests {
             assert!((drawn.iter().sum::<f64>() - 1.0).abs() < 1.0e-5);
             for (i, slot) in slots.iter().enumerate() {
                 assert_eq!(slot.light as usize, i);
-                let told = f64::from(slot.chance);
-                assert!(told > 0.0);
+                let stored = f64::from(slot.chance);
+                assert!(stored > 0.0);
                 assert!(
-                    (drawn[i] / told - 1.0).abs() < 1.0e-4,
-                    "{} {told}",
+                    (drawn[i] / stored - 1.0).abs() < 1.0e-4,
+                    "{} {stored}",
                     drawn[i]
                 );
                 assert_eq!(slot.alias_chance, slots[slot.alias as usize].chance);

@@ -14,7 +14,7 @@ use super::light_normal_bins::{BESIDE, NORMAL_BINS, POINTS, direction};
 const TILT: (f32, f32) = (0.8, 0.6);
 
 /// Weight, in rays, of a light's visibility in the whole cluster against the rays from a cell's few points. With a
-/// smaller weight, a light that none of these points sees is sampled too rarely where it is visible.
+/// smaller weight, a light that reaches none of these points is sampled too rarely where it is visible.
 const KNOWN_RAYS: f32 = 4.0;
 
 /// The same at a single point, which sends one ray to one point of the light.
@@ -234,7 +234,7 @@ impl Arriving {
                     faces.then(|| occlusion.is_free(place.point, to, &mut last))
                 })
                 .collect();
-            let believed = |found: f32, rays: f32, before: f32, known: f32| {
+            let estimate = |found: f32, rays: f32, before: f32, known: f32| {
                 (found + before * known) / (rays + known)
             };
             #[allow(clippy::cast_precision_loss)] // a handful
@@ -242,12 +242,12 @@ impl Arriving {
                 seen.iter().flatten().count() as f32,
                 seen.iter().flatten().filter(|free| **free).count() as f32,
             ];
-            *together = believed(found, rays, light.visibility, KNOWN_RAYS);
+            *together = estimate(found, rays, light.visibility, KNOWN_RAYS);
             for (at_place, seen) in arriving.at_places.iter_mut().zip(seen) {
                 if let Some(at_place) = at_place.get_mut(number) {
                     *at_place = match seen {
                         Some(free) => {
-                            believed(f32::from(free), 1.0, *together, KNOWN_RAYS_AT_PLACE)
+                            estimate(f32::from(free), 1.0, *together, KNOWN_RAYS_AT_PLACE)
                         }
                         None => *together,
                     };

@@ -266,7 +266,7 @@ fn triangle_flags(mesh: &DynamicMesh, instance: &Instance, kind: Kind, info: &Ma
     world | faces_camera | sides(kind) | rank_bits(info) | paths
 }
 
-/// Source, vertices and indices of a mesh with its own structure; `None` if it lives for one frame.
+/// Source, vertices and indices of a mesh with its own structure; `None` if it is used for one frame.
 fn kept_source(view: &TracedScene, mesh: &DynamicMesh) -> Option<(Source, u32, u32)> {
     match mesh.shape {
         Shape::Rigid(rigid) => {
@@ -471,7 +471,7 @@ impl Parts {
         self.parts.sort_by_key(|part| part.order);
     }
 
-    /// Adds a mesh that lives for one frame, in world space. Omits triangles with a non-finite corner.
+    /// Adds a mesh that is used for one frame, in world space. Omits triangles with a non-finite corner.
     fn add_changing(
         &mut self,
         view: &TracedScene,

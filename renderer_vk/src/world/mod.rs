@@ -332,11 +332,11 @@ impl World {
                 ..relight::CalibrationOptions::default()
             };
             // One line per quarter: a map may take minutes on a slow machine.
-            let (name, mut told) = (relit.name.clone(), 0);
+            let (name, mut reported) = (relit.name.clone(), 0);
             let report = relight::calibrate_with(relit, &options, &mut |done| {
                 let quarter = (done * 4.0) as u32;
-                if quarter > told && quarter < 4 {
-                    told = quarter;
+                if quarter > reported && quarter < 4 {
+                    reported = quarter;
                     log::info!("{name}: calibrating lights, {} % done", quarter * 25);
                 }
             });

@@ -230,8 +230,8 @@ fn autosprite2(vertices: &mut [DeformVertex], indices: &[u32], forward: Vec3) {
 
 /// Whether vertex `b` directly follows vertex `a` in the two triangles of a quad.
 ///
-/// The engine looks at neighbours in the list of six, across the triangles' border and without closing them. That
-/// tells the sides apart for the strip (3 0 2, 2 0 1) that map compilers make of a quad; a fan comes out twisted, in
+/// The engine looks at neighbours in the list of six, across the triangles' border and without closing them. This
+/// distinguishes the sides of the strip (3 0 2, 2 0 1) that map compilers make of a quad; a fan comes out twisted, in
 /// the engine too.
 fn follows(indices: &[u32], quad: usize, a: usize, b: usize) -> bool {
     // The last quad may be incomplete.

@@ -128,7 +128,7 @@ mod tests {
         assert!(noise_values().iter().all(|v| v.abs() <= 1.0));
         assert!(noise_values().iter().any(|v| *v > 0.8));
         assert!(noise_values().iter().any(|v| *v < -0.8));
-        // The generator's first numbers, as every C program without a seed sees them.
+        // The generator's first numbers, as in every C program without a seed.
         let mut random = Random::new();
         let first: [u32; 4] = std::array::from_fn(|_| random.number());
         assert_eq!(

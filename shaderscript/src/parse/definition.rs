@@ -21,10 +21,10 @@ const MAX_DEFORMS: usize = 3;
 /// Faults reported for one definition; a generated file of nothing but faults must not fill the memory with them.
 const MAX_REPORTS: usize = 64;
 
-/// Why the engine gives up on a definition.
+/// Reason why the engine rejects a definition.
 pub(super) struct Rejection(pub(super) String);
 
-/// The reason that no author minds: tools' materials (clip, caulk ...) are written so, and the engine says nothing.
+/// An intended reason: tools' materials (clip, caulk ...) are written so, and the engine prints no message.
 const NOTHING_TO_DRAW: &str = "no stages, and neither sky nor fog";
 
 /// Reads one definition.
@@ -115,7 +115,7 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
     fn report(&mut self, severity: Severity, message: String) {
         self.reports += 1;
         let name = Some(self.shader.name.as_str());
-        // An error is the last fault of a definition and is always told.
+        // An error is the last fault of a definition and is always reported.
         if self.reports <= MAX_REPORTS || severity == Severity::Error {
             self.reporter.report(severity, self.at, name, message);
         } else if self.reports == MAX_REPORTS + 1 {
@@ -339,7 +339,7 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
 
     fn sky(&mut self) {
         let mut argument = || self.lexer.token_on_line().map(|t| t.text);
-        // Nothing is asked for after the line's end: that would be the next line's.
+        // Reads nothing after the line's end: that would be the next line's.
         let mut arguments = || Some((argument()?, argument()?, argument()?));
         let Some((outer, height, inner)) = arguments() else {
             self.warn("skyParms needs three arguments; this is not a sky");
@@ -451,7 +451,7 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
             value
         };
         match keyword.text.to_ascii_lowercase().as_str() {
-            // An argument that is no number leaves what an earlier line said.
+            // An argument that is no number keeps the value of an earlier line.
             "q3map_surfacelight" => light.surface_light = read(0).or(light.surface_light),
             "q3map_lightimage" => light.light_image = arguments.first().cloned(),
             "q3map_lightrgb" => {

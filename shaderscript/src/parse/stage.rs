@@ -152,7 +152,7 @@ impl DefinitionParser<'_, '_, '_> {
         }
         if found > MAX_ANIMATION_IMAGES {
             self.warn(format!(
-                "animMap has {found} images, of which {MAX_ANIMATION_IMAGES} are shown"
+                "animMap has {found} images; {MAX_ANIMATION_IMAGES} are shown"
             ));
         }
         // Without images the stage keeps the one that it had.

@@ -70,7 +70,7 @@ fn main() -> ExitCode {
             _ => names.push(argument),
         }
     }
-    let program = std::env::current_exe().expect("a program knows where it is");
+    let program = std::env::current_exe().expect("the path of this program");
     let Some(outcomes) = run::compare(&program, &chosen(&names), &folder) else {
         return ExitCode::FAILURE;
     };

@@ -1,4 +1,4 @@
-//! Plays a recorded camera path through the library, as an engine calls it, and tells what the frames cost.
+//! Plays a recorded camera path through the library, as an engine calls it, and reports the cost of the frames.
 //!
 //! The path is played twice after some frames that let the driver settle: once for the times, and once with rays
 //! counted, because counting them takes time of its own. Nothing is waited for but what the library itself waits for.
@@ -63,7 +63,7 @@ pub enum PlayError {
     /// Nothing to play.
     #[error("the path has no frame")]
     Empty,
-    /// The library's report is not what it is said to be.
+    /// The library's report has another format.
     #[error("rt_stats wrote no report that can be read: {0}")]
     Stats(String),
 }
@@ -120,8 +120,8 @@ pub fn play(play: &Play) -> Result<(Report, Option<relight::compare::Rgb8>), Pla
         engine.command("rt_stats json stats")?;
         frame(&mut engine, play.size, point, &entities)?;
         if let Some(stats) = engine.read_file("stats.json") {
-            let told = || PlayError::Stats(String::from_utf8_lossy(&stats).into_owned());
-            report.add_stats(&stats).ok_or_else(told)?;
+            let error = || PlayError::Stats(String::from_utf8_lossy(&stats).into_owned());
+            report.add_stats(&stats).ok_or_else(error)?;
         }
     }
     let picture = match (play.picture, play.path.last()) {
@@ -173,7 +173,7 @@ fn view([width, height]: [i32; 2], point: &PathPoint) -> View {
 fn brush_models(engine: &mut Engine, map: &str) -> Result<Vec<refEntity_t>, Raised> {
     const PORTAL_SURFACE: i32 = 7;
     let Some(bsp) = engine.read_file(map).and_then(|b| Bsp::parse(&b).ok()) else {
-        return Ok(Vec::new()); // the library has said what is wrong with it
+        return Ok(Vec::new()); // the library printed the error
     };
     let mut entities = Vec::new();
     for entity in bsp.entities() {

@@ -117,7 +117,7 @@ impl Report {
         &self.passes
     }
 
-    /// Median of the frames' sums over all passes, milliseconds; 0 where the device tells no times.
+    /// Median of the frames' sums over all passes, milliseconds; 0 if the device has no timestamps.
     pub fn gpu_ms(&self) -> f64 {
         median(&self.gpu)
     }

@@ -44,7 +44,7 @@ pub struct cvar_t {
     pub hashIndex: c_int,
 }
 
-/// What the renderer tells about itself.
+/// Properties that the renderer reports.
 #[repr(C)]
 #[derive(Clone)]
 pub struct glconfig_t {

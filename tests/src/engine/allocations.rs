@@ -1,5 +1,5 @@
 //! Counts what Rust code takes from the heap. The library is linked into the test for that: a library of its own has
-//! an allocator of its own, which nobody else can look into.
+//! an allocator of its own, which other code cannot inspect.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -12,7 +12,7 @@ thread_local! {
 /// The system's allocator, counting for a thread that asks.
 pub struct Counting;
 
-/// One more block. With `RELIGHT_VERBOSE=1` it is told who took it.
+/// Counts a block. With `RELIGHT_VERBOSE=1` prints where it was allocated.
 fn note(size: usize) {
     // A thread that ends has no counter any more.
     let taken = TAKEN.try_with(|taken| taken.take()).ok().flatten();

@@ -7,7 +7,7 @@ use std::ptr;
 
 use super::abi::{CVAR_CHEAT, CVAR_INIT, CVAR_LATCH, CVAR_ROM, CVAR_USER_CREATED, cvar_t};
 
-/// One variable: what the renderer sees, and the strings that its pointers point to.
+/// A variable: the structure that the renderer reads, and the strings that its pointers point to.
 struct Variable {
     /// Owned; freed with the table. A raw pointer, because the renderer keeps one too.
     live: *mut cvar_t,

@@ -92,7 +92,7 @@ impl Engine {
     pub fn register_model(&mut self, name: &str) -> Result<i32, Raised> {
         let (re, name) = (self.exports(), c(name));
         let name = name.as_ptr();
-        // SAFETY: the library is loaded, and the string lives for the call.
+        // SAFETY: the library is loaded, and the string is valid during the call.
         call(move || unsafe { (re.RegisterModel)(name) })
     }
 

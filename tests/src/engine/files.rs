@@ -54,7 +54,7 @@ impl Packs {
     }
 }
 
-/// Everything that `FS_*` sees.
+/// The files of `FS_*`.
 pub struct Files {
     memory: BTreeMap<String, Vec<u8>>,
     packs: Packs,

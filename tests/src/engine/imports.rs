@@ -74,7 +74,7 @@ impl Default for Film {
     }
 }
 
-/// Everything that the engine side remembers.
+/// State of the engine side.
 pub(super) struct State {
     pub exports: Option<refexport_t>,
     /// Where `BeginRegistration` writes; the real engine keeps one such structure for good.
@@ -444,7 +444,7 @@ extern "C" fn cin_upload(handle: c_int) {
         return;
     };
     let side = film.side;
-    // SAFETY: the library is loaded; the picture has the size that is passed and lives for the call.
+    // SAFETY: the library is loaded; the picture has the passed size and is valid during the call.
     unsafe { (exports.UploadCinematic)(side, side, side, side, film.rgba.as_ptr(), handle, 1) };
 }
 

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use std::ffi::c_void;
 use std::ptr;
 
-/// What freed memory is filled with, so that whoever still reads it sees it.
+/// What freed memory is filled with, so that later reads are visible.
 const POISON: u8 = 0xDD;
 
 /// One allocation.

@@ -1,7 +1,7 @@
 //! A stand-in for the engine: it loads the renderer library, offers it the engine's services and drives it through
 //! the life of a game, in a process that a test can look into.
 //!
-//! It behaves as Debian's ioquake3 does where a renderer can tell: console variables are live structures, temporary
+//! It behaves as Debian's ioquake3 does towards a renderer: console variables are live structures, temporary
 //! memory is a stack, the hunk is thrown away whole, an error leaves the renderer by `longjmp` after it has been shut
 //! down and registered anew from inside the call that raised it, the library is unloaded and loaded again by a video
 //! restart. It is stricter where the real one would corrupt itself silently: see [`Engine::violations`].
@@ -36,7 +36,7 @@ pub use imports::{Message, Tables};
 pub struct Raised {
     /// 0 ends the process, 1 drops the game.
     pub level: i32,
-    /// What it said.
+    /// Text of the message.
     pub message: String,
 }
 
@@ -47,7 +47,7 @@ pub enum LoadError {
     #[error("{0}: {1}")]
     Library(PathBuf, libloading::Error),
     /// `GetRefAPI` gave no table.
-    #[error("GetRefAPI returned NULL; the renderer said: {0}")]
+    #[error("GetRefAPI returned NULL; the renderer printed: {0}")]
     Refused(String),
     /// It raised an error.
     #[error(transparent)]
@@ -117,7 +117,7 @@ fn call<R: Copy>(f: impl FnOnce() -> R + Copy) -> Result<R, Raised> {
         result: MaybeUninit<R>,
     }
     unsafe extern "C" fn thunk<F: FnOnce() -> R + Copy, R: Copy>(slot: *mut c_void) {
-        // SAFETY: `call` passes its slot, which lives until the call is over.
+        // SAFETY: `call` passes its slot, which is valid until the call is over.
         let slot = unsafe { &mut *slot.cast::<Slot<F, R>>() };
         slot.result.write((slot.f)());
     }
@@ -150,7 +150,7 @@ fn begin_registration(exports: refexport_t) -> Result<(), Raised> {
     };
     // Renderers fill tables with random numbers when they start: the same ones each time.
     imports::seed_random_numbers();
-    // SAFETY: the library is loaded; the structure stays where it is for as long as the engine lives.
+    // SAFETY: the library is loaded; the structure stays where it is for as long as the engine exists.
     call(move || unsafe { (exports.BeginRegistration)(config) })?;
     imports::with(|s| s.registered = true);
     for name in [c"gfx/2d/bigchars", c"white", c"console"] {
@@ -288,11 +288,11 @@ impl Engine {
         let place = &raw mut table;
         // SAFETY: the table outlives the call.
         let exports = call(move || unsafe { get_ref_api(REF_API_VERSION, place.cast()) })?;
-        // SAFETY: nobody may read it any more, and zeros crash whoever calls through them.
+        // SAFETY: it must not be read any more, and calls through zeros crash.
         unsafe { std::ptr::write_bytes(place, 0, 1) };
         if exports.is_null() {
-            let said = self.messages().into_iter().map(|m| m.text).collect();
-            return Err(LoadError::Refused(said));
+            let printed = self.messages().into_iter().map(|m| m.text).collect();
+            return Err(LoadError::Refused(printed));
         }
         // SAFETY: not NULL, so it is the renderer's table.
         let exports = unsafe { *exports };

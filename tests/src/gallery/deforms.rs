@@ -58,7 +58,7 @@ fn normals(shape: Shape) -> Board {
 
 fn sprites(shape: Shape) -> Board {
     let body = |d: &str, s: &str| format!("cull none\n{d}\n{{\nmap g/base.tga\n{s}\n}}");
-    // A sprite is a square, of which the second kind cannot tell which sides are the short ones.
+    // A sprite is a square, which has no short sides for `autosprite2` to find.
     let square = |body: &String| shape != Shape::Sprite || !body.contains("autosprite2");
     let bodies = [
         body("deformVertexes autosprite", "rgbGen identity"),

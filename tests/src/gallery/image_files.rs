@@ -115,7 +115,7 @@ pub fn pcx(
     bytes
 }
 
-/// What a PNG says before its pixels.
+/// The chunks of a PNG before its pixels.
 pub struct Png<'a> {
     /// Bits of a sample: 1, 2, 4, 8 or 16.
     pub bits: u8,

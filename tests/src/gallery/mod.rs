@@ -55,7 +55,7 @@ pub struct Limit {
 }
 
 impl Limit {
-    /// What no eye tells apart.
+    /// Invisible difference.
     pub const SAME: Self = Self {
         ssim: 0.995,
         mean: 1.0,

@@ -19,7 +19,7 @@ pub struct Vertex {
 pub struct Surface {
     /// Skins name it.
     pub name: String,
-    /// As the file says it.
+    /// As stored in the file.
     pub shader: String,
     /// Three a triangle, clockwise seen from the front.
     pub indices: Vec<i32>,

@@ -83,14 +83,14 @@ pub fn play(
         if !failure.is_empty() {
             std::fs::write(folder.join(format!("{}.failed", scene.name)), failure)?;
         }
-        // Last: it says that the scene is over.
+        // Last: it marks the end of the scene.
         std::fs::write(folder.join(format!("{}.done", scene.name)), "")?;
     }
     Ok(())
 }
 
 /// Plays scenes on both renderers in processes of `program` (the gallery's own), compares what they left below
-/// `folder`, and writes the contact sheet there. `None`, with a line that says why, where something is not installed.
+/// `folder`, and writes the contact sheet there. `None`, with a line with the reason, where something is not installed.
 ///
 /// # Panics
 /// When processes or files fail.

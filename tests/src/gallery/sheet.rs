@@ -94,8 +94,8 @@ pub fn compare(scenes: &[Scene], folder: &Path) -> Vec<Outcome> {
                 let facts = folder
                     .join(player.name())
                     .join(format!("{}.txt", scene.name));
-                let told = player == Player::Ours || !facts.is_file();
-                if told {
+                let shown = player == Player::Ours || !facts.is_file();
+                if shown {
                     outcomes.push(outcome("", None, complaint));
                 }
             }

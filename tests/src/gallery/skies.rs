@@ -10,8 +10,8 @@ use crate::maps::tga;
 
 const MAP: &str = "maps/sky.bsp";
 
-/// A box of which a side is missing, clouds alone, clouds over a box, the same in a fog, and a sky that is in no map: the height of its
-/// clouds is that of all, for it is read last.
+/// A box without one side, clouds alone, clouds over a box, the same in a fog, and a sky that is in no map: the height
+/// of its clouds is that of all, for it is read last.
 const SCRIPT: &str = "
 sky/box
 {

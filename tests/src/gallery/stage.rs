@@ -120,7 +120,7 @@ impl Stage {
         let picture = self.engine.picture_of(|engine| {
             draw(engine)?;
             // The reference reads the picture back before it has drawn the last run of 2D pictures; another shader
-            // ends that run. In the engine itself screenshots are asked for between frames.
+            // ends that run. In the engine itself screenshots are requested between frames.
             for name in ["gfx/2d/bigchars", "white"] {
                 let shader = engine.register_shader(name)?;
                 engine.draw_stretch_pic([0.0; 4], [0.0; 4], shader)?;

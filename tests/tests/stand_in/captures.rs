@@ -155,11 +155,11 @@ fn a_still_picture_is_made_beside_the_game() {
         }
         engine.end_frame().unwrap();
     };
-    let said = |engine: &mut Engine| text_of(&engine.take_messages());
+    let printed = |engine: &mut Engine| text_of(&engine.take_messages());
     engine.take_messages();
     frame(&mut engine, "rt_screenshot 4", 30.0);
     assert!(
-        said(&mut engine).contains("set r_rt 1"),
+        printed(&mut engine).contains("set r_rt 1"),
         "it needs the traced look"
     );
     engine.set("r_rt", "1");
@@ -178,18 +178,18 @@ fn a_still_picture_is_made_beside_the_game() {
         engine.take_messages();
         frame(&mut engine, wrong, 30.0);
         assert!(
-            said(&mut engine).contains("rt_screenshot"),
+            printed(&mut engine).contains("rt_screenshot"),
             "{wrong} is taken"
         );
     }
     engine.take_messages();
     frame(&mut engine, "rt_screenshot 16 320x240", 30.0);
     frame(&mut engine, "rt_screenshot 1", 30.0);
-    // the picture is of the view when it was asked for, whatever the game shows meanwhile
+    // the picture is of the view at the request, whatever the game shows meanwhile
     for _ in 0..20 {
         frame(&mut engine, "", 120.0);
     }
-    let lines = said(&mut engine);
+    let lines = printed(&mut engine);
     assert!(
         lines.contains("in progress") && lines.contains("of 16 samples"),
         "{lines}"

@@ -231,12 +231,12 @@ fn engines_with_other_tables_are_refused_before_their_services_are_called() {
         (Tables::OpenArena, "version \"OpenArena 0.8.8 oa2020\""),
         (Tables::Quake3e, "52 services"),
     ] {
-        let Err(LoadError::Refused(said)) = load(tables) else {
+        let Err(LoadError::Refused(printed)) = load(tables) else {
             panic!("{tables:?} is served")
         };
-        assert!(said.contains(found), "{said}");
-        assert!(said.contains("+set cl_renderer opengl1"), "{said}");
-        assert_eq!(said.lines().count(), 1, "{said}");
+        assert!(printed.contains(found), "{printed}");
+        assert!(printed.contains("+set cl_renderer opengl1"), "{printed}");
+        assert_eq!(printed.lines().count(), 1, "{printed}");
     }
     for tables in [Tables::WorldOfPadman, Tables::Ioquake3] {
         let mut engine = load(tables).expect("it has ioquake3's services");

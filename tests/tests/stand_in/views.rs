@@ -375,8 +375,8 @@ fn lights_of_the_map_can_be_chosen_while_playing() {
             engine.picture(&view).unwrap();
         }
         shown.push(engine.picture(&view).unwrap());
-        let said = text_of(&engine.take_messages());
-        fitted += said.matches("lights calibrated").count();
+        let printed = text_of(&engine.take_messages());
+        fitted += printed.matches("lights calibrated").count();
     }
     // each light is found once, and then put back
     assert_eq!(fitted, 1);
@@ -386,8 +386,8 @@ fn lights_of_the_map_can_be_chosen_while_playing() {
     }
     engine.take_messages();
     engine.command("rt_lights").unwrap();
-    let said = text_of(&engine.take_messages());
-    assert!(said.contains("triangle lights"), "{said}");
+    let printed = text_of(&engine.take_messages());
+    assert!(printed.contains("triangle lights"), "{printed}");
     engine.assert_clean();
 }
 

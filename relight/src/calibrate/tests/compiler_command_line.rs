@@ -6,7 +6,7 @@ use crate::occluders::Occluders;
 /// How far surfaces make a place dirty, id units.
 const DEPTH: f32 = 128.0;
 
-/// A room whose map says how its light was computed.
+/// A room whose map has the compiler's command line.
 fn saying(pairs: &[(&str, &str)], light: &dyn Fn(Vec3, Vec3) -> Vec3) -> RelitWorld {
     let mut map = room_map("t/wall", false, usize::MAX, Some(light));
     for (key, value) in pairs {

@@ -90,7 +90,7 @@ fn a_surface_gets_at_most_one_sample_a_texel() {
         .filter(|s| (s.position - a).dot(normal).abs() < 2.0);
     let on_first = on_first.count();
     assert!((12..=16).contains(&on_first), "{on_first}");
-    // What it cannot tell is asked of the others.
+    // the remaining samples are on the other surfaces
     assert!(samples.len() > 2700, "{}", samples.len());
 }
 

@@ -8,7 +8,7 @@ use support::random::hashed_uniform;
 /// How far off what any light could explain texels are, stops.
 const NOISE: f32 = 0.2;
 
-/// A room lit by its lamp as the directive says, but for noise.
+/// A room lit by its lamp with the directive's strength, plus noise.
 fn noisy() -> RelitWorld {
     let lamp = from_lamp(0.0);
     let light = |at: Vec3, normal: Vec3| {

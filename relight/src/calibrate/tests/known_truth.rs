@@ -10,7 +10,7 @@ const SKY_HEIGHT: f32 = 250.0;
 const SKY_END: f32 = -60.0;
 const AMBIENT: f32 = 3.0 * 4.0 / 255.0;
 const SUN: Vec3 = Vec3::new(1.6, 1.4, 1.1);
-/// Strength of the lamp in terms of what its directive says.
+/// Strength of the lamp over that of its directive.
 const FACTOR: f32 = 0.4;
 
 fn sun_direction() -> Vec3 {

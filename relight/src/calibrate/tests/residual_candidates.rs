@@ -32,12 +32,12 @@ fn candidate_rows_are_reused_and_extended_by_new_samples() {
     let before = look(&mut kept, &all[..first]);
     let after = look(&mut kept, &all);
     let anew = look(&mut ResidualCandidates::new(0), &all);
-    let told = |columns: &[columns::Column]| -> Vec<_> {
+    let values = |columns: &[columns::Column]| -> Vec<_> {
         let column = |c: &columns::Column| (format!("{:?}", c.source), c.rows.clone(), c.limit);
         columns.iter().map(column).collect()
     };
     assert!(after.len() > 100, "{}", after.len());
-    assert!(told(&after) == told(&anew));
+    assert!(values(&after) == values(&anew));
     // Places come up again, and what joined is seen from them.
     let again = |c: &&columns::Column| before.iter().any(|b| b.source == c.source);
     let joined = |c: &columns::Column| c.rows.iter().any(|(i, _)| *i as usize >= first);

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Strength of the lamp in terms of what its directive says.
+/// Strength of the lamp over that of its directive.
 pub(super) const FACTOR: f32 = 2.5;
 
 const AREA: f32 = 40.0 * 60.0;
@@ -57,13 +57,13 @@ fn a_back_splash_is_found_as_one_source() {
 #[test]
 fn lamps_without_back_splashes_get_none() {
     let mut world = room(true, Some(&from_lamp(0.0)));
-    let mut told = vec![0.0];
-    let report = calibrate_with(&mut world, &small(), &mut |part| told.push(part));
+    let mut parts = vec![0.0];
+    let report = calibrate_with(&mut world, &small(), &mut |part| parts.push(part));
     assert_eq!(report.splashes, 0, "{report:?}");
     // Nor does progress wait for a try without them.
-    let steps = told.windows(2).map(|pair| pair[1] - pair[0]);
+    let steps = parts.windows(2).map(|pair| pair[1] - pair[0]);
     let longest = steps.fold(0.0, f32::max);
-    assert!(longest < 0.3, "{longest} {told:?}");
+    assert!(longest < 0.3, "{longest} {parts:?}");
 }
 
 #[test]
@@ -96,10 +96,10 @@ fn unexplained_light_takes_more_samples_and_progress_is_monotonic() {
         Vec3::splat(4.0 * 0.01f32.powf(hashed_uniform))
     };
     let mut world = room(true, Some(&noise));
-    let mut told = Vec::new();
-    let report = calibrate_with(&mut world, &small(), &mut |part| told.push(part));
+    let mut parts = Vec::new();
+    let report = calibrate_with(&mut world, &small(), &mut |part| parts.push(part));
     assert!(report.after.median_stops > 0.3, "{report:?}");
     assert!(report.samples > 2 * small().samples * 9 / 10, "{report:?}");
-    assert!(told.is_sorted(), "{told:?}");
-    assert!(told.last().is_some_and(|last| (0.99..=1.0).contains(last)));
+    assert!(parts.is_sorted(), "{parts:?}");
+    assert!(parts.last().is_some_and(|last| (0.99..=1.0).contains(last)));
 }

@@ -20,7 +20,7 @@ const LONGEST: f64 = 120.0;
 /// The vertex whose wobble the whole texture has: its two directions are a quarter of a wave apart.
 const SWAYING: Vec3 = Vec3::new(0.0, 256.0, 0.0);
 
-/// What changes, as an animation says it.
+/// An animated value, in the form of a glTF animation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Track {
     /// Times of the keys, seconds.
@@ -163,7 +163,7 @@ impl Motion {
         key_times(&self.periods(), !self.tc_mods.iter().any(bent))
     }
 
-    /// The motion as an animation says it.
+    /// The motion as a glTF animation.
     pub fn track(&self) -> Track {
         let times = self.times();
         let mut values = Vec::with_capacity(times.len());

@@ -54,8 +54,9 @@ impl Document<'_> {
             let path = &model.path;
             let surfaces = match model_file::read(self.source.files, &model) {
                 Ok((surfaces, trouble)) => {
-                    let told = trouble.map(|t| format!("{path}: the skin of {}: {t}", used.first));
-                    self.warnings.extend(told);
+                    let warning =
+                        trouble.map(|t| format!("{path}: the skin of {}: {t}", used.first));
+                    self.warnings.extend(warning);
                     surfaces
                 }
                 Err(problem) => {
@@ -102,12 +103,12 @@ impl Document<'_> {
                 ));
             }
             if !primitives.is_empty() {
-                let told = match &model.skin {
+                let extras = match &model.skin {
                     Some(skin) => json!({"file": path, "skin": skin}),
                     None => json!({"file": path}),
                 };
                 self.meshes
-                    .push(json!({"name": path, "primitives": primitives, "extras": told}));
+                    .push(json!({"name": path, "primitives": primitives, "extras": extras}));
                 out.meshes.insert(model, self.meshes.len() - 1);
             }
         }

@@ -193,18 +193,18 @@ impl Maker<'_> {
         if !extensions.is_empty() {
             out.insert("extensions".into(), Value::Object(extensions));
         }
-        let mut told = extras::material(layer.whole);
-        if let (Value::Object(told), false) = (&mut told, look.lost.is_empty()) {
-            told.insert("lost".into(), json!(look.lost));
+        let mut extras = extras::material(layer.whole);
+        if let (Value::Object(extras), false) = (&mut extras, look.lost.is_empty()) {
+            extras.insert("lost".into(), json!(look.lost));
         }
-        if let (Value::Object(told), Some(stage)) = (&mut told, layer.stage()) {
-            told.insert("layer".into(), json!(stage));
+        if let (Value::Object(extras), Some(stage)) = (&mut extras, layer.stage()) {
+            extras.insert("layer".into(), json!(stage));
         }
-        let mut told = json!({"material": told});
-        if let (Value::Object(told), Some(lightmap), true) = (&mut told, lightmap, shown) {
-            told.insert("lightmap".into(), lightmap);
+        let mut extras = json!({"material": extras});
+        if let (Value::Object(extras), Some(lightmap), true) = (&mut extras, lightmap, shown) {
+            extras.insert("lightmap".into(), lightmap);
         }
-        out.insert("extras".into(), told);
+        out.insert("extras".into(), extras);
         Ok(Value::Object(out))
     }
 
@@ -299,7 +299,7 @@ impl Maker<'_> {
     }
 }
 
-/// A matrix of texture coordinates, as the turn and the sizes that glTF knows: turn · size. `None` for others.
+/// A matrix of texture coordinates as a rotation and scales, the form of glTF: rotation · scale. `None` for others.
 pub fn turn_and_size(matrix: [Vec2; 2]) -> Option<(f32, Vec2)> {
     let [s, t] = matrix;
     // s is where the first coordinate goes: (size cos, -size sin)
@@ -311,7 +311,7 @@ pub fn turn_and_size(matrix: [Vec2; 2]) -> Option<(f32, Vec2)> {
     (straight && size.is_finite() && angle.is_finite()).then_some((angle, size))
 }
 
-/// The texture transform of a slot; `None` where there is none, or none that glTF knows.
+/// The texture transform of a slot; `None` if it has none, or none that glTF can represent.
 fn transform(slot: &Slot) -> Option<Map<String, Value>> {
     if slot.tc_mods.is_empty() {
         return None;

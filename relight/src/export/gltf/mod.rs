@@ -379,14 +379,14 @@ impl Document<'_> {
                 })
             })
             .collect();
-        let mut told = json!({
+        let mut extras = json!({
             "map": world.name,
             "scale": source.options.scale,
             "axes": "id units (x, y, z) are scale * (x, z, -y)",
             "exposure": source.exposure(),
             "ambient": world.ambient.to_array(),
         });
-        if let (Value::Object(map), false) = (&mut told, flares.is_empty()) {
+        if let (Value::Object(map), false) = (&mut extras, flares.is_empty()) {
             map.insert("flares".into(), json!(flares));
         }
         root.insert(
@@ -394,7 +394,7 @@ impl Document<'_> {
             json!({
                 "version": "2.0",
                 "generator": concat!("relight ", env!("CARGO_PKG_VERSION")),
-                "extras": told,
+                "extras": extras,
             }),
         );
         let all = self.nodes.add(json!({"name": stem, "children": top}));

@@ -34,7 +34,7 @@ pub fn look_in(source: &Export<'_>, material: &WorldMaterial, lighting: Lighting
     (look, shaded)
 }
 
-/// Makes films of a material's pictures, and tells how its colours change. `bounds`: least and largest texture
+/// Animates a material's pictures, and returns how its colours change. `bounds`: least and largest texture
 /// coordinates of its surfaces, where they are known.
 pub fn make_moving(
     source: &Export<'_>,
@@ -50,7 +50,7 @@ pub fn make_moving(
     for slot in [&mut look.color, &mut look.glow].into_iter().flatten() {
         let film = bounds.and_then(|bounds| Film::of(slot, shader, bounds));
         let Some(film) = film else {
-            told_sway(shader, slot, &mut look.lost);
+            report_sway(shader, slot, &mut look.lost);
             continue;
         };
         let picture = Picture::Film(film);
@@ -79,23 +79,28 @@ pub fn make_moving(
     pulse
 }
 
-/// Takes what was told of the stages that are `meant` back.
-fn not_lost(shader: &Shader, lost: &mut Vec<String>, told: &str, meant: impl Fn(&Stage) -> bool) {
+/// Removes a message about the stages that are `meant`.
+fn not_lost(
+    shader: &Shader,
+    lost: &mut Vec<String>,
+    message: &str,
+    meant: impl Fn(&Stage) -> bool,
+) {
     for (i, _) in shader.stages.iter().enumerate().filter(|(_, s)| meant(s)) {
-        let told = format!("stage {i}: {told}");
-        lost.retain(|line| *line != told);
+        let message = format!("stage {i}: {message}");
+        lost.retain(|line| *line != message);
     }
 }
 
-/// Tells of wobbles what becomes of them.
-fn told_sway(shader: &Shader, slot: &Slot, lost: &mut [String]) {
+/// Reports how turbulence is approximated.
+fn report_sway(shader: &Shader, slot: &Slot, lost: &mut [String]) {
     let wobbles = |m: &TcMod| matches!(m, TcMod::Turbulent { .. });
     if !slot.tc_mods.iter().any(wobbles) {
         return;
     }
     for (i, stage) in shader.stages.iter().enumerate() {
-        let told = format!("stage {i}: {WOBBLE}");
-        if let Some(line) = lost.iter_mut().find(|line| **line == told)
+        let message = format!("stage {i}: {WOBBLE}");
+        if let Some(line) = lost.iter_mut().find(|line| **line == message)
             && stage.tc_mods == slot.tc_mods
         {
             line.push_str("; it sways as a whole");

@@ -94,7 +94,7 @@ impl Pulse {
         }
     }
 
-    /// The factors as an animation says them; `place`: the material's in the document, `strength`: what its glow is
+    /// The factors as a glTF animation; `place`: the material's in the document, `strength`: what its glow is
     /// multiplied with besides, `None` where it has none.
     pub fn track(&self, place: &str, strength: Option<f32>) -> Track {
         let mut parts = Vec::new();

@@ -105,11 +105,11 @@ impl Document<'_> {
         self.meshes
             .push(json!({"name": "sky", "primitives": primitives}));
         let mesh = self.meshes.len() - 1;
-        let told = extras::material(material);
+        let extras = extras::material(material);
         Ok(Some(self.nodes.add(json!({
             "name": "sky",
             "mesh": mesh,
-            "extras": {"material": told, "radiance": radiance.map(|r| r.to_array())},
+            "extras": {"material": extras, "radiance": radiance.map(|r| r.to_array())},
         }))))
     }
 

@@ -104,7 +104,7 @@ impl Point {
     }
 }
 
-/// What a cluster sees, and the lights that matter in it.
+/// The clusters visible from a cluster, and its light list.
 #[derive(Serialize)]
 struct Cluster {
     sees: Option<Vec<usize>>,

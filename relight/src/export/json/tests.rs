@@ -176,7 +176,7 @@ proptest! {
     }
 }
 
-/// Whether a value is what the published schema says; as far as that schema uses the language.
+/// Checks a value against the published schema, for the keywords that the schema uses.
 fn conforms(value: &Value, schema: &Value, root: &Value, path: &str) {
     if let Some(reference) = schema["$ref"].as_str() {
         let schema = root.pointer(reference.trim_start_matches('#')).unwrap();
@@ -186,7 +186,7 @@ fn conforms(value: &Value, schema: &Value, root: &Value, path: &str) {
         let fits = |choice: &Value| {
             std::panic::catch_unwind(|| conforms(value, choice, root, path)).is_ok()
         };
-        // Those told apart by their kind first, so that a fault inside is shown.
+        // Choices that their kind distinguishes come first, so that a fault inside is shown.
         let null = |s: &Value| s["type"] == "null";
         if let ([one, other], false) = (choices.as_slice(), value.is_null())
             && null(other)

@@ -1,4 +1,4 @@
-//! The forms in which a side of a brush says how its texture lies.
+//! The forms of the texture projection of a brush side.
 //!
 //! * Brush primitives (`brushDef`): the texture as a matrix over two axes in the side's plane that follow from its
 //!   normal, in repetitions of the image. What Quake III's editors and compilers read; no size of an image is needed.
@@ -35,12 +35,12 @@ pub(super) enum Form {
 pub(super) struct Line {
     /// The line.
     pub text: String,
-    /// Whether the texture lies as asked for.
+    /// Whether the texture has the requested projection.
     pub exact: bool,
 }
 
 impl Form {
-    /// The form asked for, for a map of a format.
+    /// The requested form, for a map of a format.
     pub(super) fn of(choice: Brushes, format: Format) -> Form {
         match choice {
             Brushes::Primitives => Form::Primitives,

@@ -1,4 +1,4 @@
-//! Maps as map files, read back by a parser that nobody here wrote.
+//! Maps as map files, read back by a foreign parser.
 
 use super::*;
 use crate::export::{ExportOptions, ImageStore, uncalibrated as world};
@@ -16,7 +16,7 @@ fn written(world: &RelitWorld, files: &dyn crate::GameFiles) -> (String, Tally) 
         materials: &materials,
         images: &ImageStore::default(),
         options: ExportOptions {
-            // What the foreign parser knows.
+            // The brushes of the foreign parser.
             brushes: crate::export::Brushes::Valve,
             ..ExportOptions::default()
         },
@@ -58,7 +58,7 @@ fn map() -> Bsp {
     map.build()
 }
 
-/// The document without its patches, which parsers of Quake's form do not know.
+/// The document without its patches, which parsers of Quake's form do not support.
 fn without_patches(text: &str) -> String {
     let mut out = String::new();
     let mut lines = text.lines().peekable();

@@ -13,7 +13,7 @@ const PARALLEL: f64 = 0.999;
 /// Largest distance between them, id units.
 const NEAR: f64 = 0.25;
 
-/// Id units per texel where nothing tells, the editors' default.
+/// Id units per texel by default, as in editors.
 const DEFAULT_SCALE: f64 = 0.5;
 
 /// Width and height of a texture that cannot be read: the editors' stand-in.
@@ -73,7 +73,7 @@ impl Drawn {
                 };
                 let corners = [a, b, c].map(|v| v.position.as_dvec3());
                 let front = (corners[2] - corners[0]).cross(corners[1] - corners[0]);
-                // Slivers tell nothing reliable.
+                // Slivers have no reliable projection.
                 if front.length() > 0.5 {
                     list.push(Triangle {
                         normal: front.normalize(),
@@ -107,7 +107,7 @@ impl Drawn {
             (b - a).cross(c - a).length()
         };
         let in_front = |t: &Triangle| t.normal.dot(normal) > 0.0;
-        // Where only the back was drawn, as of a fog or a liquid seen from inside, that tells.
+        // If only the back is drawn, as of a fog or a liquid seen from inside, it decides.
         let better = |a: &&Triangle, b: &&Triangle| {
             let sides = in_front(a).cmp(&in_front(b));
             sides.then(area(a).total_cmp(&area(b)))
@@ -159,7 +159,7 @@ fn projection_of(triangle: &Triangle) -> Option<Projection> {
     })
 }
 
-/// A texture laid on along the axes that the plane faces least, where nothing tells.
+/// The default projection: along the axes that the plane faces least.
 pub(super) fn default_projection(normal: DVec3, (width, height): (u32, u32)) -> Projection {
     let n = normal.abs();
     let axes = if n.z >= n.x && n.z >= n.y {
@@ -201,7 +201,7 @@ impl<'a> Sizes<'a> {
         }
         let mut materials = self.world.materials.iter();
         let material = materials.find(|m| m.name.eq_ignore_ascii_case(shader));
-        // What is drawn for a material without a script is its image, or a stand-in whose size says nothing.
+        // A material without a script shows its image, or a stand-in of arbitrary size.
         let definition = material.and_then(|m| m.resolved.script.as_ref());
         let editor = definition.and_then(|d| d.light.editor_image.as_deref());
         let stage = definition.and_then(|d| d.image_names().next());

@@ -202,12 +202,12 @@ fn directives_count_even_where_the_default_is_drawn() {
     assert!(
         (world.lights[0].radiance - Vec3::splat(50.0 * SURFACE_LIGHT_RADIANCE)).length() < 1e-4
     );
-    let told: Vec<_> = world
+    let warned: Vec<_> = world
         .warnings
         .iter()
         .filter(|w| w.contains("t/nowhere"))
         .collect();
-    assert_eq!(told.len(), 1, "{:?}", world.warnings);
+    assert_eq!(warned.len(), 1, "{:?}", world.warnings);
 }
 
 #[test]
@@ -297,9 +297,9 @@ fn negative_lights_are_left_out_with_a_warning() {
     map.add_entity(&[light[0], light[1], ("light", "100"), ("scale", "-1")]);
     let world = relight(map);
     assert_eq!(world.point_lights.len(), 1);
-    let told = |w: &&String| w.contains("2 light entities with negative light");
+    let warned = |w: &&String| w.contains("2 light entities with negative light");
     assert_eq!(
-        world.warnings.iter().filter(told).count(),
+        world.warnings.iter().filter(warned).count(),
         1,
         "{:?}",
         world.warnings

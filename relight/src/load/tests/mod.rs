@@ -92,8 +92,8 @@ fn game() -> MemoryFiles {
     files
 }
 
-/// Lights as directives say, whatever the lightmaps tell.
-fn as_said() -> Options<'static> {
+/// Lights by directives, without calibration.
+fn by_directives() -> Options<'static> {
     Options {
         light_color: LightColor::Stored,
         calibrate: None,
@@ -106,7 +106,7 @@ fn relight(map: MapBuilder) -> RelitWorld {
     let (materials, diagnostics) = Materials::load(&files);
     assert!(diagnostics.is_empty(), "{diagnostics:?}");
     let bsp = Bsp::parse(&map.build().write()).unwrap();
-    RelitWorld::from_bsp(&files, &materials, "test", bsp, as_said())
+    RelitWorld::from_bsp(&files, &materials, "test", bsp, by_directives())
 }
 
 /// A square of 2 × 2 `half`, front to +z, at a height.

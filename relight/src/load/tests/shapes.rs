@@ -1,6 +1,6 @@
 //! Geometry: normals, patches, fogs.
 
-use super::{as_said, ceiling_lamp, game, relight};
+use super::{by_directives, ceiling_lamp, game, relight};
 use crate::load::*;
 use crate::materials::Materials;
 use crate::world::*;
@@ -75,9 +75,9 @@ fn a_fog_that_nothing_describes_hides_nothing_where_it_fills_the_world() {
         }
         let files = game();
         let (materials, _) = Materials::load(&files);
-        let world = RelitWorld::from_bsp(&files, &materials, "test", bsp, as_said());
-        let told = |w: &String| w.contains("left out the fog") && w.contains(material);
-        let warned = world.warnings.iter().any(told);
+        let world = RelitWorld::from_bsp(&files, &materials, "test", bsp, by_directives());
+        let names_fog = |w: &String| w.contains("left out the fog") && w.contains(material);
+        let warned = world.warnings.iter().any(names_fog);
         // a game warns of what is wrong with the map, and of materials as it registers them
         let (of_map, all) = (world.map_warnings().count(), world.warnings.len());
         let faults = world

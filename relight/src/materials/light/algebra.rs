@@ -1,13 +1,13 @@
 //! The stages of a material as a linear function of light.
 //!
 //! The engine's stages multiply and add colours that already contain light: a lightmap, vertex light, the light
-//! grid. To light a surface anew, the stack has to be told apart into `lit * L + emission + through * B`, where L is
+//! grid. To light a surface anew, the stack is decomposed into `lit * L + emission + through * B`, where L is
 //! the incident light (what the lightmap would have shown), and B the background. Each stage is a polynomial in L
 //! and B, and blending multiplies polynomials; two rules keep the result linear:
 //!
 //! * L^2 counts as L: a surface that was multiplied by its light twice is still lit once.
-//! * L B counts as B: the background brings its own light, and so do mirrored surroundings. (The eye sees the background
-//!   darkened by stored light once more where the engine does so: [`darkens_behind`].)
+//! * L B counts as B: the background brings its own light, and so do mirrored surroundings. (The camera sees the
+//!   background darkened by stored light once more where the engine does so: [`darkens_behind`].)
 //!
 //! All colours are linear; nothing is clamped. Alphas and blend factors made of them are plain numbers. The engine blends
 //! colours that are encoded for the display, though. Where that comes to something else than the same sum in linear light
@@ -106,7 +106,7 @@ impl LightLinear {
 /// Evaluates a stack of stages.
 ///
 /// `samples` holds what each stage shows, in the same order; missing ones count as [`StageSample::WHITE`].
-/// `vertex_light` tells that the surface's vertex colours are light, as on world surfaces without a lightmap.
+/// `vertex_light`: the surface's vertex colours are light, as on world surfaces without a lightmap.
 /// A stage whose sample fails its alpha test draws nothing.
 ///
 /// The background starts with coefficient 1 when the first stage blends, else with 0. Destination alpha counts as

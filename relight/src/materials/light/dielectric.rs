@@ -25,15 +25,15 @@ pub fn refraction_index(shader: &Shader) -> Option<f32> {
     }
 }
 
-/// Whether light that passes a surface takes on its colour: glass, what says `surfaceparm lightfilter`, and what only
-/// multiplies the background. Decals lie on something that stops the light.
+/// Whether light that passes a surface takes on its colour: glass, materials with `surfaceparm lightfilter`, and those
+/// that only multiply the background. Decals lie on something that stops the light.
 pub fn filters_light(shader: &Shader) -> bool {
     let found = classify(shader);
     match found.class {
         SurfaceClass::Glass => true,
         SurfaceClass::Translucent => {
-            let says = shader.surface_flags & SURF_LIGHTFILTER != 0;
-            !shader.polygon_offset && (says || found.filter)
+            let has_filter = shader.surface_flags & SURF_LIGHTFILTER != 0;
+            !shader.polygon_offset && (has_filter || found.filter)
         }
         _ => false,
     }
@@ -84,7 +84,7 @@ const SLOW_TURN: f32 = 10.0;
 /// Pictures a second, likewise, that it may move by.
 const SLOW_SCROLL: f32 = 0.05;
 
-/// Whether a picture of an environment moves so that nobody would take it for the surroundings.
+/// Whether a picture of an environment moves in a way that reflections do not.
 fn moves_as_effect(tc_mod: &TcMod) -> bool {
     match tc_mod {
         TcMod::Rotate(degrees) => degrees.abs() > SLOW_TURN,
@@ -227,7 +227,7 @@ mod tests {
         };
         const BODY: &str = "{\nmap a\nblendFunc add\n}";
         const LIGHT: &str = "{\nmap $lightmap\nblendFunc filter\n}";
-        let picture = |says: &str| format!("{{\nmap e\ntcGen environment\n{says}\n}}");
+        let picture = |lines: &str| format!("{{\nmap e\ntcGen environment\n{lines}\n}}");
         let bare = picture("");
         assert!(gloss(&format!("{bare}\n{BODY}\n{LIGHT}")));
         // no light comes to what is added above the lightmap, or where there is none

@@ -23,7 +23,7 @@ use shaderscript::surface_params::{
 };
 use shaderscript::{AlphaGen, BlendFactor, Cull, Shader, Stage, TcGen, sort};
 
-/// The kinds of surface that a light simulation tells apart.
+/// The kinds of surface that a light simulation distinguishes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum SurfaceClass {
     /// Stops light.
@@ -146,7 +146,7 @@ pub fn classify(shader: &Shader) -> LightClass {
 
 /// Whether light passes a material of one side: `surfaceparm trans` without `alphashadow` and `lightfilter`. Map compilers
 /// give such a material no shadow. Cel-shading shells are such materials; with a shadow they would darken the surfaces that they
-/// enclose. Two-sided materials keep their shadow, because the eye sees what casts it.
+/// enclose. Two-sided materials keep their shadow, because its caster is visible.
 fn is_passed(shader: &Shader) -> bool {
     shader.cull != Cull::None
         && shader.content_flags & CONTENTS_TRANSLUCENT != 0

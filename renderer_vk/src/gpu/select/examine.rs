@@ -16,7 +16,7 @@ const STORAGE_IMAGES: u32 = 4096;
 /// Invocations of the largest compute work groups: 16 x 16. Vulkan guarantees half as many, drivers support more.
 const GROUP: u32 = 256;
 
-/// Examines one device: its features, or one line that says why it is unusable.
+/// Examines one device: its features, or the reason why it is unusable, in one line.
 pub(super) fn examine(
     instance: &Instance,
     physical: vk::PhysicalDevice,

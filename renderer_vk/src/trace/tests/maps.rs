@@ -222,7 +222,7 @@ fn tracers_agree_on_maps() {
             let drawn = (&mut assets, &world);
             let (pixels, look) = game.draw(drawn, &passes, &settings, [64, 48], 2);
             pictures.push(pixels);
-            // what the second frame cost is told when its place in the ring is taken again
+            // the cost of the second frame is available when its place in the ring is used again
             let ring = &mut game.gpu.ring;
             ring.begin().and_then(|rec| ring.end(rec)).expect("frame");
             let passes = [

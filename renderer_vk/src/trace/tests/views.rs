@@ -91,7 +91,7 @@ fn a_mirror_shows_what_is_behind_the_camera_and_the_player(gpu: &mut Gpu) {
     };
     scene.mesh(screen(-5.0), blue, weapon);
     shows(gpu, &scene, half(GREEN));
-    // no mirror deeper than the setting says
+    // no more mirrors than the setting permits
     let shallow = Settings {
         rt_max_depth: 0,
         ..reference()
