@@ -1,6 +1,6 @@
 # shellcheck shell=bash
 # Shared by the scripts of this repository: where things are, how to say things, how to start the engine.
-# Sourced, never run. Every failure is one sentence that says what to do.
+# Sourced, never run. Every failure is one sentence with the remedy.
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -53,7 +53,7 @@ use_software_vulkan() {
 use_cargo() {
   command -v cargo >/dev/null 2>&1 || PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
   command -v cargo >/dev/null 2>&1 ||
-    die "Rust's cargo is not on the PATH: install it as https://rustup.rs says, then run this again."
+    die "Rust's cargo is not on the PATH: install it (https://rustup.rs), then run this again."
 }
 
 # engine_folder LIBRARY: a private folder in which the engine finds its own renderers and ours.
@@ -93,13 +93,13 @@ map_names() {
     tr '[:upper:]' '[:lower:]' | tr -d '\0' | LC_ALL=C sed -e 's,^.*maps/,,' -e 's,\.bsp$,,' | sort -u
 }
 
-# check_pack FILE: ends with what is wrong with a pack that somebody named.
+# check_pack FILE: exits with a message if a pack of the command line is unusable.
 check_pack() {
   [ -e "$1" ] || die "There is no file $1; is its path right?"
   [ -f "$1" ] || die "$1 is no file; name one pack (.pk3)."
-  [ -r "$1" ] || die "$1 cannot be read; chmod +r lets it."
+  [ -r "$1" ] || die "$1 cannot be read; use chmod +r."
   [ "$(head -c 2 -- "$1" | tr -d '\0')" = PK ] || die "$1 is no pack (a zip file named .pk3); download it again, or unpack the archive it came in."
-  [ -n "$(map_names "$1")" ] || die "$1 has no maps where the game reads them, in a folder maps at its top; relight info '$1' says what is in it."
+  [ -n "$(map_names "$1")" ] || die "$1 has no maps where the game reads them, in a folder maps at its top; relight info '$1' lists its contents."
 }
 
 # game_with PACK FOLDER: makes FOLDER the game's folder for every engine that is started from here on: links to all that
