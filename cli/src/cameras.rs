@@ -100,7 +100,7 @@ pub fn places(entities: &[q3bsp::Entity], count: usize) -> Vec<Place> {
     views.extend((0..wanted).filter_map(|i| spawns.get(i * spawns.len() / wanted)));
     views.truncate(count);
     let place = |view: Viewpoint| Place {
-        origin: (view.position - Vec3::Z * VIEW_HEIGHT).round(),
+        origin: (view.origin - Vec3::Z * VIEW_HEIGHT).round(),
         yaw: view.yaw.round(),
     };
     views.into_iter().map(place).collect()

@@ -124,16 +124,8 @@ pub struct Camera {
 
 impl From<Viewpoint> for Camera {
     fn from(view: Viewpoint) -> Self {
-        let Viewpoint {
-            position,
-            yaw,
-            pitch,
-        } = view;
-        Self {
-            origin: position,
-            yaw,
-            pitch,
-        }
+        let Viewpoint { origin, yaw, pitch } = view;
+        Self { origin, yaw, pitch }
     }
 }
 

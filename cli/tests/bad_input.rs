@@ -8,7 +8,7 @@ use std::process::Command;
 use testkit::Random;
 
 /// Every command that reads maps, on one file: the code, and the one line about it.
-fn printed(bytes: &[u8]) -> String {
+fn error(bytes: &[u8]) -> String {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("bad.bsp"), bytes).unwrap();
     let mut lines = Vec::new();
@@ -38,14 +38,14 @@ fn a_map_that_is_cut_off_names_lump_and_offset() {
         let whole = map(format);
         let bsp = Bsp::parse(&whole).unwrap();
         let vertices = bsp.container.lumps[Lump::DrawVerts.index()];
-        let cut = printed(&whole[..vertices.offset as usize + 10]);
+        let cut = error(&whole[..vertices.offset as usize + 10]);
         assert!(
             cut.contains("offset") && cut.contains("outside the file of"),
             "{cut}"
         );
     }
-    assert!(printed(&map(Format::Ibsp46)[..50]).contains("50 bytes"));
-    assert!(printed(b"").contains("0 bytes"));
+    assert!(error(&map(Format::Ibsp46)[..50]).contains("50 bytes"));
+    assert!(error(b"").contains("0 bytes"));
 }
 
 #[test]
@@ -54,7 +54,7 @@ fn a_wrong_reference_names_lump_and_offset() {
     let bsp = Bsp::parse(&bytes).unwrap();
     let at = bsp.container.lumps[Lump::Surfaces.index()].offset as usize + 148;
     bytes[at..at + 4].copy_from_slice(&999i32.to_le_bytes());
-    let text = printed(&bytes);
+    let text = error(&bytes);
     assert!(
         text.contains("lump surfaces, element 1: shaderNum is 999"),
         "{text}"
@@ -72,10 +72,10 @@ fn foreign_and_random_files_are_told() {
         (b"PK\x03\x04 and so on", "zip"),
         (b"\x89PNG\r\n\x1a\n", "unknown"),
     ] {
-        let text = printed(bytes);
+        let text = error(bytes);
         assert!(text.contains(part), "{part}: {text}");
     }
-    printed(&Random::new(1).bytes(5000));
+    error(&Random::new(1).bytes(5000));
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn refused(program: &str, arguments: &[&str]) -> String {
 fn numbers_that_make_no_sense_are_refused() {
     const RENDER: &[&str] = &["render", "m", "-o", "out.png"];
     const CONVERT: &[&str] = &["convert", "m", "-o", "out.glb"];
-    for (command, option, number, printed) in [
+    for (command, option, number, part) in [
         (RENDER, "--fov", "0", "from 1 to 170 degrees"),
         (RENDER, "--fov", "180", "from 1 to 170 degrees"),
         (RENDER, "--fov", "NaN", "from 1 to 170 degrees"),
@@ -139,15 +139,9 @@ fn numbers_that_make_no_sense_are_refused() {
         (RENDER, "--lens", "NaN,100", "numbers above 0"),
         (RENDER, "--lens", "4,0", "numbers above 0"),
     ] {
-        refused_option(
-            env!("CARGO_BIN_EXE_relight"),
-            command,
-            option,
-            number,
-            printed,
-        );
+        refused_option(env!("CARGO_BIN_EXE_relight"), command, option, number, part);
     }
-    for (command, option, number, printed) in [
+    for (command, option, number, part) in [
         ("measure", "--fov", "180", "from 1 to 170 degrees"),
         ("measure", "--frames", "1", "1 is not in 2.."),
         ("measure", "--views", "0", "of at least 1"),
@@ -159,16 +153,16 @@ fn numbers_that_make_no_sense_are_refused() {
         ("looks", "--frames", "0", "0 is not in 1.."),
     ] {
         let lab = env!("CARGO_BIN_EXE_relight-lab");
-        refused_option(lab, &[command, "m"], option, number, printed);
+        refused_option(lab, &[command, "m"], option, number, part);
     }
 }
 
 /// Checks that a program refuses a value of an option, by the option's name and with what it takes.
-fn refused_option(program: &str, command: &[&str], option: &str, value: &str, printed: &str) {
+fn refused_option(program: &str, command: &[&str], option: &str, value: &str, part: &str) {
     let arguments = [command, &[option, value]].concat();
     let text = refused(program, &arguments);
     assert!(
-        text.contains(option) && text.contains(printed),
+        text.contains(option) && text.contains(part),
         "{arguments:?}: {text}"
     );
 }
@@ -193,7 +187,7 @@ fn a_pack_with_everything_below_one_folder_names_the_folder() {
         &["info", "PACK"],
         &["render", "PACK", "-o", "out.png"],
     ] {
-        let printed = |pack: &str| {
+        let error = |pack: &str| {
             let words = command.iter().map(|w| if *w == "PACK" { pack } else { w });
             let output = Command::new(env!("CARGO_BIN_EXE_relight"))
                 .current_dir(folder.path())
@@ -204,14 +198,14 @@ fn a_pack_with_everything_below_one_folder_names_the_folder() {
             assert!(!output.status.success(), "{command:?}: {output:?}");
             String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned()
         };
-        let deep = printed("deep.pk3");
+        let deep = error("deep.pk3");
         let named = deep.contains("below the folder MyMap (MyMap/Maps/x.bsp)");
         assert!(
             named && deep.contains("pack what is inside of MyMap"),
             "{deep}"
         );
-        let flat = printed("flat.pk3");
+        let flat = error("flat.pk3");
         assert!(flat.contains("x.bsp is in no folder maps"), "{flat}");
-        assert!(printed("none.pk3").contains("no maps in it"));
+        assert!(error("none.pk3").contains("no maps in it"));
     }
 }

@@ -67,23 +67,23 @@ pub struct StillShot {
     /// Path in the user's game folder.
     pub path: String,
     /// Tenths of the work that have been reported.
-    reported: u32,
+    shown: u32,
 }
 
 impl StillShot {
     /// A picture without progress.
     pub fn new(path: String) -> Self {
-        Self { path, reported: 0 }
+        Self { path, shown: 0 }
     }
 
     /// A progress message for each tenth of the work.
     pub fn progress(&mut self, done: u32, wanted: u32) -> Option<String> {
         let tenths = u64::from(done) * 10 / u64::from(wanted.max(1));
         let tenths = u32::try_from(tenths).unwrap_or(10);
-        if tenths <= self.reported || tenths >= 10 {
+        if tenths <= self.shown || tenths >= 10 {
             return None;
         }
-        self.reported = tenths;
+        self.shown = tenths;
         Some(format!("rt_screenshot: {done} of {wanted} samples"))
     }
 }
@@ -438,10 +438,10 @@ mod tests {
             assert_eq!(of(bad), None, "{bad:?}");
         }
         let mut shot = StillShot::new("a.tga".into());
-        let reported: Vec<u32> = (1..=25)
+        let shown: Vec<u32> = (1..=25)
             .filter(|i| shot.progress(*i, 25).is_some())
             .collect();
-        assert_eq!(reported, [3, 5, 8, 10, 13, 15, 18, 20, 23]);
+        assert_eq!(shown, [3, 5, 8, 10, 13, 15, 18, 20, 23]);
     }
 
     #[test]

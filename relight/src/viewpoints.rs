@@ -12,7 +12,7 @@ pub const SPAWN_LIFT: f32 = 9.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Viewpoint {
     /// Camera position, id units.
-    pub position: Vec3,
+    pub origin: Vec3,
     /// Degrees from east to north.
     pub yaw: f32,
     /// Degrees down.
@@ -48,22 +48,18 @@ pub fn target(entity: &Entity, entities: &[Entity]) -> Option<Vec3> {
 pub fn intermission(entities: &[Entity]) -> Option<Viewpoint> {
     let entity = entities.iter().find(|e| is_intermission(e))?;
     // An entity without an origin is at 0, as in the engine.
-    let position = entity.vec3("origin").unwrap_or_default();
-    let to = target(entity, entities).map(|target| target - position);
+    let origin = entity.vec3("origin").unwrap_or_default();
+    let to = target(entity, entities).map(|target| target - origin);
     if let Some(to) = to.filter(|to| to.length() > 1.0) {
         return Some(Viewpoint {
-            position,
+            origin,
             yaw: to.y.atan2(to.x).to_degrees(),
             pitch: -to.z.atan2(to.truncate().length()).to_degrees(),
         });
     }
     let pitch = entity.vec3("angles").map_or(0.0, |angles| angles.x);
     let yaw = yaw(entity);
-    Some(Viewpoint {
-        position,
-        yaw,
-        pitch,
-    })
+    Some(Viewpoint { origin, yaw, pitch })
 }
 
 /// What players see where they appear, in the order of the map.
@@ -71,7 +67,7 @@ pub fn spawn_views(entities: &[Entity]) -> impl Iterator<Item = Viewpoint> {
     let spawns = entities.iter().filter(|entity| is_spawn_point(entity));
     spawns.map(|entity| Viewpoint {
         // As above.
-        position: entity.vec3("origin").unwrap_or_default() + Vec3::Z * (SPAWN_LIFT + VIEW_HEIGHT),
+        origin: entity.vec3("origin").unwrap_or_default() + Vec3::Z * (SPAWN_LIFT + VIEW_HEIGHT),
         yaw: yaw(entity),
         pitch: 0.0,
     })
@@ -125,13 +121,13 @@ mod tests {
         "#;
         let (entities, _) = q3bsp::entities::parse(text.as_bytes());
         let spawn = Viewpoint {
-            position: Vec3::new(1.0, 2.0, 38.0),
+            origin: Vec3::new(1.0, 2.0, 38.0),
             yaw: 90.0,
             pitch: 0.0,
         };
         assert_eq!(spawn_views(&entities).collect::<Vec<_>>(), [spawn]);
         let camera = intermission(&entities).expect("a camera");
-        assert_eq!((camera.position, camera.yaw), (Vec3::Z * 100.0, -90.0));
+        assert_eq!((camera.origin, camera.yaw), (Vec3::Z * 100.0, -90.0));
         assert!((camera.pitch - 45.0).abs() < 1e-4, "{}", camera.pitch);
         assert_eq!(intermission(&entities[..1]), None);
     }

@@ -252,12 +252,11 @@ fn obj_has_layers_where_they_cover_half_and_says_so() {
     assert_eq!(faces, written.report.triangles);
     // Of the first square one triangle is covered by 195 of 255 in the mean, and the other by 149.
     assert_eq!(faces, 4 + 2);
-    let printed = &written.report.warnings;
+    let list = &written.report.warnings;
     assert!(
-        printed
-            .iter()
+        list.iter()
             .any(|w| w.contains("terrain.layer1") && w.contains("OBJ lacks")),
-        "{printed:?}"
+        "{list:?}"
     );
 }
 

@@ -192,17 +192,15 @@ mod tests {
         ]);
         assert_eq!(images(&library, "a"), ["x"]);
         assert_eq!(images(&library, "b"), ["y"], "the engine loses it");
-        let printed = |library: &Library| -> Vec<String> {
+        let lines = |library: &Library| -> Vec<String> {
             (library.warnings_of_files().map(ToString::to_string)).collect()
         };
-        assert_eq!(printed(&library).len(), 1);
-        assert!(
-            printed(&library)[0].starts_with("open:8:1: warning: this comment is never closed")
-        );
-        assert!(printed(&library)[0].ends_with("put */ where the comment ends"));
+        assert_eq!(lines(&library).len(), 1);
+        assert!(lines(&library)[0].starts_with("open:8:1: warning: this comment is never closed"));
+        assert!(lines(&library)[0].ends_with("put */ where the comment ends"));
         // a file that the engine drops cannot spoil others
         let library = Library::new([("open", "a {\n{\nmap x\n/*\n}\n}\n")]);
-        assert_eq!((library.dropped().len(), printed(&library).len()), (1, 0));
+        assert_eq!((library.dropped().len(), lines(&library).len()), (1, 0));
     }
 
     #[test]

@@ -165,10 +165,7 @@ pub fn calibrate_with(
     progress: &mut dyn FnMut(f32),
 ) -> CalibrationReport {
     let begin = Instant::now();
-    let key = options
-        .cache
-        .as_ref()
-        .map(|_| result_cache::key(world, options));
+    let key = (options.cache.is_some()).then(|| result_cache::key(world, options));
     let unknown_skies = skies::unknown_skies(world);
     skies::open(world, &unknown_skies);
     let kept = match (&options.cache, key) {

@@ -22,17 +22,17 @@ const HALF_HEIGHT: f32 = 0.75;
 
 /// Camera at a spawn point.
 struct View {
-    position: Vec3,
+    origin: Vec3,
     forward: Vec3,
 }
 
 /// The views from the spawn points.
 fn views(entities: &[Entity]) -> Vec<View> {
     let all: Vec<View> = viewpoints::spawn_views(entities)
-        .filter_map(|Viewpoint { position, yaw, .. }| {
+        .filter_map(|Viewpoint { origin, yaw, .. }| {
             let (sin, cos) = yaw.to_radians().sin_cos();
             let forward = Vec3::new(cos, sin, 0.0);
-            (position.is_finite() && forward.is_finite()).then_some(View { position, forward })
+            (origin.is_finite() && forward.is_finite()).then_some(View { origin, forward })
         })
         .collect();
     let step = all.len().div_ceil(VIEWS).max(1);
@@ -56,14 +56,14 @@ pub(super) fn visible_samples(
             let x = (ray as f32 + random.uniform()) / rays as f32 * 2.0 - 1.0;
             let y = (random.uniform() * 2.0 - 1.0) * HALF_HEIGHT;
             let ray = view.forward + aside * x + Vec3::Z * y;
-            let hit = occluders.nearest(view.position, ray, f32::INFINITY);
+            let hit = occluders.nearest(view.origin, ray, f32::INFINITY);
             let hit = hit.filter(|hit| hit.front && !hit.sky)?;
             let surface = *of_triangle.get(hit.tag as usize)?;
             let index = world.surfaces.get(surface as usize)?.material;
             if world.materials.get(index as usize)?.emission.is_some() {
                 return None;
             }
-            let sample = near.find(samples, view.position + ray * hit.t, hit.normal)?;
+            let sample = near.find(samples, view.origin + ray * hit.t, hit.normal)?;
             Some((sample, index))
         };
         (0..rays).filter_map(pixel).collect::<Vec<_>>()

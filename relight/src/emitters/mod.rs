@@ -78,9 +78,9 @@ pub const AMBIENT_RADIANCE: f32 = 4.0 / 255.0;
 
 /// Factor that the compiler applied to light before storing it, from `q3map_lightmapBrightness`; 1 by default.
 /// Bounded to 1/64..64, the range of bytes.
-pub fn stored_scale(directive: Option<f32>) -> f32 {
-    directive
-        .filter(|scale| *scale > 0.0 && scale.is_finite())
+pub fn stored_scale(scale: Option<f32>) -> f32 {
+    scale
+        .filter(|s| *s > 0.0 && s.is_finite())
         .map_or(1.0, |scale| scale.clamp(1.0 / 64.0, 64.0))
 }
 

@@ -56,12 +56,7 @@ impl DynamicStateCommands {
     }
 
     /// Records the parts of `wanted` that differ from the last recorded state of this pass.
-    pub fn record(
-        &self,
-        cmd: vk::CommandBuffer,
-        wanted: DynamicState,
-        recorded: Option<DynamicState>,
-    ) {
+    pub fn record(&self, cmd: vk::CommandBuffer, wanted: DynamicState, last: Option<DynamicState>) {
         let (source, target) = wanted
             .blend
             .unwrap_or((BlendFactor::One, BlendFactor::Zero));
@@ -70,21 +65,21 @@ impl DynamicStateCommands {
             .dst_color_blend_factor(target.vk())
             .src_alpha_blend_factor(source.vk())
             .dst_alpha_blend_factor(target.vk());
-        if recorded.map(|t| t.cull) != Some(wanted.cull) {
+        if last.map(|t| t.cull) != Some(wanted.cull) {
             // SAFETY: recording, and the feature is on.
             unsafe { self.base.cmd_set_cull_mode(cmd, wanted.cull.vk()) };
         }
-        if recorded.map(|t| t.depth_test) != Some(wanted.depth_test) {
+        if last.map(|t| t.depth_test) != Some(wanted.depth_test) {
             let test = wanted.depth_test.vk();
             // SAFETY: as above.
             unsafe { self.base.cmd_set_depth_compare_op(cmd, test) };
         }
-        if recorded.map(|t| t.depth_write) != Some(wanted.depth_write) {
+        if last.map(|t| t.depth_write) != Some(wanted.depth_write) {
             let write = wanted.depth_write;
             // SAFETY: as above.
             unsafe { self.base.cmd_set_depth_write_enable(cmd, write) };
         }
-        if recorded.map(|t| t.blend) != Some(wanted.blend) {
+        if last.map(|t| t.blend) != Some(wanted.blend) {
             let on = [wanted.blend.is_some().into()];
             // SAFETY: as above.
             unsafe { self.blending.cmd_set_color_blend_enable(cmd, 0, &on) };

@@ -112,7 +112,7 @@ impl Seen {
         sky: &Sky,
         instance: &Instance,
         is_seen: &dyn Fn(u32) -> bool,
-        camera: Vec3,
+        from: Vec3,
         lens: f32,
     ) -> Option<Self> {
         let surfaces = sky.surfaces.iter().filter(|(number, _)| is_seen(*number));
@@ -122,7 +122,7 @@ impl Seen {
         let normal = (axis * sky.normal).try_normalize()?;
         let plane = normal.extend(normal.dot(axis * sky.point + instance.origin));
         // rays end at the back of a sky, too
-        let in_front = normal.dot(camera) >= plane.w;
+        let in_front = normal.dot(from) >= plane.w;
         Some(Self {
             plane: if in_front { plane } else { -plane },
             bounds: bounds.grown(Vec3::splat(lens)),
@@ -130,13 +130,13 @@ impl Seen {
     }
 
     /// Whether a ray from the camera may reach a box behind the sky.
-    fn hides(&self, bounds: &Aabb, camera: Vec3) -> bool {
+    fn hides(&self, bounds: &Aabb, from: Vec3) -> bool {
         let normal = self.plane.truncate();
         if normal.dot(bounds.nearest(normal)) > self.plane.w - IN_PLANE {
             return false;
         }
         // these bounds hold all segments from the camera to the box
-        bounds.with(camera).touches(self.bounds)
+        bounds.with(from).touches(self.bounds)
     }
 }
 
@@ -154,7 +154,7 @@ impl Beyond {
     /// map's, if the view shows it.
     pub fn of(
         view: &TracedScene,
-        camera: Vec3,
+        from: Vec3,
         lens: f32,
         geometry: Option<&StaticGeometry>,
         materials: &dyn MaterialTable,
@@ -167,11 +167,10 @@ impl Beyond {
             return Self::default();
         }
         let mut beyond = Self::default();
-        let skies = skies_in_sight(map, view, world, camera, lens);
+        let skies = skies_in_sight(map, view, world, from, lens);
         let frustum = view.view.frustum();
         let is_hidden = |bounds: &Aabb| {
-            may_be_seen(bounds, camera, &frustum)
-                && skies.iter().any(|sky| sky.hides(bounds, camera))
+            may_be_seen(bounds, from, &frustum) && skies.iter().any(|sky| sky.hides(bounds, from))
         };
         if skies.is_empty() {
             return beyond;
@@ -214,7 +213,7 @@ fn skies_in_sight(
     map: &MapSkies,
     view: &TracedScene,
     world: &Instance,
-    camera: Vec3,
+    from: Vec3,
     lens: f32,
 ) -> Vec<Seen> {
     let frustum = view.view.frustum();
@@ -227,8 +226,8 @@ fn skies_in_sight(
     let mut found = Vec::new();
     for sky in &map.skies {
         let mut add = |instance: &Instance, is_seen: &dyn Fn(u32) -> bool| {
-            let seen = Seen::of(sky, instance, is_seen, camera, lens);
-            found.extend(seen.filter(|sky| may_be_seen(&sky.bounds, camera, &frustum)));
+            let seen = Seen::of(sky, instance, is_seen, from, lens);
+            found.extend(seen.filter(|sky| may_be_seen(&sky.bounds, from, &frustum)));
         };
         if sky.model == 0 {
             add(world, &|number| {

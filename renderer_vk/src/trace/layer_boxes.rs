@@ -59,11 +59,9 @@ pub(super) fn placed(bounds: &Aabb, instance: &Instance) -> Option<Aabb> {
 }
 
 /// Whether primary rays of a view may meet a box.
-pub(super) fn may_be_seen(bounds: &Aabb, camera: Vec3, frustum: &[Vec4]) -> bool {
+pub(super) fn may_be_seen(bounds: &Aabb, from: Vec3, frustum: &[Vec4]) -> bool {
     // rays pass through all of a pixel, also at the picture's edge
-    let farthest = (bounds.mins - camera)
-        .abs()
-        .max((bounds.maxs - camera).abs());
+    let farthest = (bounds.mins - from).abs().max((bounds.maxs - from).abs());
     let margin = Vec3::splat(0.01 * farthest.max_element());
     !outside(&bounds.grown(margin), frustum)
 }
@@ -75,7 +73,7 @@ pub fn in_sight(
     materials: &dyn MaterialTable,
 ) -> Vec<Aabb> {
     let frustum = view.view.frustum();
-    let camera = view.view.origin;
+    let from = view.view.origin;
     let mut boxes = Vec::new();
     let mut add = |bounds: &Aabb, instance: u32| {
         let Some(instance) = view.instances.get(instance as usize) else {
@@ -84,7 +82,7 @@ pub fn in_sight(
         let Some(bounds) = placed(bounds, instance) else {
             return;
         };
-        if may_be_seen(&bounds, camera, &frustum) {
+        if may_be_seen(&bounds, from, &frustum) {
             boxes.push(bounds);
         }
     };

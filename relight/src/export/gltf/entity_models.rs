@@ -54,9 +54,8 @@ impl Document<'_> {
             let path = &model.path;
             let surfaces = match model_file::read(self.source.files, &model) {
                 Ok((surfaces, trouble)) => {
-                    let warning =
-                        trouble.map(|t| format!("{path}: the skin of {}: {t}", used.first));
-                    self.warnings.extend(warning);
+                    let line = trouble.map(|t| format!("{path}: the skin of {}: {t}", used.first));
+                    self.warnings.extend(line);
                     surfaces
                 }
                 Err(problem) => {

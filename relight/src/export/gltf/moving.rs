@@ -80,15 +80,10 @@ pub fn make_moving(
 }
 
 /// Removes a message about the stages that are `meant`.
-fn not_lost(
-    shader: &Shader,
-    lost: &mut Vec<String>,
-    message: &str,
-    meant: impl Fn(&Stage) -> bool,
-) {
+fn not_lost(shader: &Shader, lost: &mut Vec<String>, text: &str, meant: impl Fn(&Stage) -> bool) {
     for (i, _) in shader.stages.iter().enumerate().filter(|(_, s)| meant(s)) {
-        let message = format!("stage {i}: {message}");
-        lost.retain(|line| *line != message);
+        let text = format!("stage {i}: {text}");
+        lost.retain(|line| *line != text);
     }
 }
 
@@ -99,8 +94,8 @@ fn report_sway(shader: &Shader, slot: &Slot, lost: &mut [String]) {
         return;
     }
     for (i, stage) in shader.stages.iter().enumerate() {
-        let message = format!("stage {i}: {WOBBLE}");
-        if let Some(line) = lost.iter_mut().find(|line| **line == message)
+        let text = format!("stage {i}: {WOBBLE}");
+        if let Some(line) = lost.iter_mut().find(|line| **line == text)
             && stage.tc_mods == slot.tc_mods
         {
             line.push_str("; it sways as a whole");

@@ -64,14 +64,8 @@ fn clear() -> Stage {
 }
 
 /// A glowing ceiling and floor with a surface at height 0 between them.
-fn scene(
-    camera: Vec3,
-    target: Vec3,
-    stages: &[Stage],
-    flags: u32,
-    dielectric: Dielectric,
-) -> Scene {
-    let mut scene = Scene::new(camera, target, 50.0, SIDE as i32);
+fn scene(from: Vec3, target: Vec3, stages: &[Stage], flags: u32, dielectric: Dielectric) -> Scene {
+    let mut scene = Scene::new(from, target, 50.0, SIDE as i32);
     let above = scene.material(&[stage::constant([encode(ABOVE); 3])], 0);
     let below = scene.material(&[stage::constant([encode(BELOW); 3])], 0);
     scene.quad(level(300.0, false), above);
@@ -123,9 +117,9 @@ fn water_reflects_by_fresnel_and_absorbs_by_beer(gpu: &mut Gpu) {
         absorption: Vec3::splat(0.004),
         ..Dielectric::default()
     };
-    let camera = Vec3::new(0.0, 0.0, 60.0);
+    let from = Vec3::new(0.0, 0.0, 60.0);
     let target = Vec3::new(100.0, 10.0, 0.0);
-    let scene = scene(camera, target, &[clear()], LIQUID, water);
+    let scene = scene(from, target, &[clear()], LIQUID, water);
     let exact = |incident: f32| {
         let reflected = fresnel(incident, 1.33).unwrap_or(1.0);
         let way = 100.0 / (incident.sin() / 1.33).asin().cos();
@@ -148,7 +142,7 @@ fn from_below_water_reflects_everything_beyond_its_angle(gpu: &mut Gpu) {
         scale: 1.0,
         ..Dielectric::default()
     };
-    let camera = Vec3::new(0.0, 0.0, -60.0);
+    let from = Vec3::new(0.0, 0.0, -60.0);
     let exact = |incident: f32| {
         let reflected = fresnel(incident, 1.0 / 1.33).unwrap_or(1.0);
         reflected * below + (1.0 - reflected) * above
@@ -159,7 +153,7 @@ fn from_below_water_reflects_everything_beyond_its_angle(gpu: &mut Gpu) {
         Vec3::new(70.0, 0.0, 0.0),
         Vec3::new(160.0, 0.0, 0.0),
     ] {
-        let mut scene = scene(camera, target, &[clear()], LIQUID, water);
+        let mut scene = scene(from, target, &[clear()], LIQUID, water);
         scene.def.fov_x = 30.0;
         scene.def.fov_y = 30.0;
         compare(gpu, &scene, &middles(), exact);
@@ -173,14 +167,14 @@ fn a_pane_reflects_from_both_faces(gpu: &mut Gpu) {
         scale: 1.0,
         ..Dielectric::default()
     };
-    let camera = Vec3::new(0.0, 0.0, 60.0);
+    let from = Vec3::new(0.0, 0.0, 60.0);
     let target = Vec3::new(60.0, 10.0, 0.0);
     // tinted: the tint multiplies the refraction, not the reflection
     let flags = c::MATERIAL_GLASS | c::MATERIAL_TRANSLUCENT;
     let tint = (encode(0.6) * 255.0 + 0.001).floor() / 255.0;
     let decode = |v: f32| crate::trace::frame_lights::decode(Vec3::splat(v)).x;
     let stages = [stage::filter([encode(0.6); 3])];
-    let scene = scene(camera, target, &stages, flags, glass);
+    let scene = scene(from, target, &stages, flags, glass);
     compare(gpu, &scene, &middles(), |incident| {
         let face = fresnel(incident, 1.5).unwrap_or(1.0);
         let pane = 2.0 * face / (1.0 + face);
@@ -196,14 +190,8 @@ fn ripples_keep_the_light_that_a_surface_sends_on(gpu: &mut Gpu) {
         ripple: 0.08,
         ..Dielectric::default()
     };
-    let camera = Vec3::new(0.0, 0.0, 60.0);
-    let mut scene = scene(
-        camera,
-        Vec3::new(100.0, 10.0, 0.0),
-        &[clear()],
-        LIQUID,
-        water,
-    );
+    let from = Vec3::new(0.0, 0.0, 60.0);
+    let mut scene = scene(from, Vec3::new(100.0, 10.0, 0.0), &[clear()], LIQUID, water);
     let first = scene.stages[0];
     scene.stages[1] = first;
     let (pixels, _) = gpu.render(&scene, &middles(), 4);
@@ -228,9 +216,9 @@ fn an_environment_stage_shows_what_is_around(gpu: &mut Gpu) {
     // a body of one colour that reflects a quarter of its surroundings
     let body = stage::constant([0.5; 3]);
     let shine = stage::shine(0);
-    let camera = Vec3::new(0.0, 0.0, 60.0);
+    let from = Vec3::new(0.0, 0.0, 60.0);
     let target = Vec3::new(100.0, 10.0, 0.0);
-    let mut scene = scene(camera, target, &[body, shine], 0, Dielectric::default());
+    let mut scene = scene(from, target, &[body, shine], 0, Dielectric::default());
     scene.images.push(image.texture_index());
     let weight = crate::trace::frame_lights::decode(Vec3::splat(128.0 / 255.0)).x;
     let exact = through_byte(0.5) + weight * above;
@@ -253,8 +241,8 @@ fn gloss_shows_the_light_by_its_picture_and_mirrors(gpu: &mut Gpu) {
         stage::gloss(0),
         stage::light_over(),
     ];
-    let (camera, target) = (Vec3::new(0.0, 0.0, 60.0), Vec3::new(100.0, 10.0, 0.0));
-    let mut scene = scene(camera, target, &stages, 0, Dielectric::default());
+    let (from, target) = (Vec3::new(0.0, 0.0, 60.0), Vec3::new(100.0, 10.0, 0.0));
+    let mut scene = scene(from, target, &stages, 0, Dielectric::default());
     scene.images.push(image.texture_index());
     let linear = |displayed: f32| crate::trace::frame_lights::decode(Vec3::splat(displayed)).x;
     for light in [0.7, 0.0] {
@@ -336,8 +324,8 @@ fn a_shiny_pixel_alone_is_as_bright_as_its_surface(gpu: &mut Gpu) {
         .expect("upload");
     let body = stage::constant([0.5; 3]);
     let shine = stage::shine(0);
-    let (camera, target) = (Vec3::new(0.0, 0.0, 60.0), Vec3::new(100.0, 10.0, 0.0));
-    let mut scene = scene(camera, target, &[body], 0, Dielectric::default());
+    let (from, target) = (Vec3::new(0.0, 0.0, 60.0), Vec3::new(100.0, 10.0, 0.0));
+    let mut scene = scene(from, target, &[body], 0, Dielectric::default());
     scene.images.push(image.texture_index());
     let patch = scene.material(&[body, shine], c::MATERIAL_TWO_SIDED);
     let [_, left, up] = scene.def.view_axis;
@@ -345,7 +333,7 @@ fn a_shiny_pixel_alone_is_as_bright_as_its_surface(gpu: &mut Gpu) {
     let alone = [(5, 5), (9, 8), (15, 15), (18, 5)].map(|(x, y)| y * SIDE + x);
     for i in alone {
         let size = 0.5;
-        let corner = camera + direction(&scene, i) * 20.0 - (left + up) * (size * 0.5);
+        let corner = from + direction(&scene, i) * 20.0 - (left + up) * (size * 0.5);
         scene.quad(rectangle(corner, left * size, up * size), patch);
     }
     let one = Settings {
