@@ -39,7 +39,7 @@
 //! radiance.
 //!
 //! The numbers are a prior. Compilers have options (`-areascale`, `-pointscale`, gamma) that leave no trace
-//! in the map. [`LightColor`] is the exponent of directives' colours.
+//! in the map. [`LightColor`] selects the exponent of directives' colours.
 //!
 //! Source: the constants are the defaults of q3map2 (area scale 0.25, point scale 7500, sky scale 1); the
 //! units are written out here.
