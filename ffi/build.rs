@@ -2,6 +2,7 @@
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
+    // Cargo sets it.
     let os = std::env::var("CARGO_CFG_TARGET_OS").unwrap_or_default();
     if matches!(os.as_str(), "linux" | "freebsd" | "netbsd" | "openbsd") {
         // The engine unloads a renderer on every vid_restart. Code that ever ran a thread cannot be unmapped

@@ -82,7 +82,7 @@ fn main() {
     let constant_ids = constant_ids(&root, &files, &mut errors);
     let roots = Roots([&root, &out.join("glsl")]);
     for file in &files {
-        let extension = file.rsplit('.').next().unwrap_or_default();
+        let extension = file.rsplit_once('.').map_or("", |(_, extension)| extension);
         if STAGES.iter().any(|s| s.0 == extension) {
             match fs::read_to_string(root.join(file)) {
                 Ok(text) => jobs_of_file(file, extension, &text, &mut jobs, &mut errors),
@@ -170,7 +170,8 @@ fn for_tracers(job: &Job, symbols: &BTreeSet<String>) -> String {
     }
 }
 
-/// The size of a compute shader's work groups: the operands of `OpExecutionMode LocalSize`. 1 for other stages.
+/// The size of a compute shader's work groups: the operands of `OpExecutionMode LocalSize`. 1 for other stages, and for
+/// words that end early, which Vulkan refuses.
 fn local_size(words: &[u32]) -> [u32; 3] {
     const HEADER: usize = 5;
     const OP_EXECUTION_MODE: u32 = 16;
@@ -259,6 +260,7 @@ fn constant_ids(root: &Path, files: &[String], errors: &mut String) -> String {
     let mut folders: BTreeMap<&str, String> = BTreeMap::new();
     let mut all = String::new();
     for file in files {
+        // The compiler reports what cannot be read.
         let text = fs::read_to_string(root.join(file)).unwrap_or_default();
         let constants = match shared::specialization_constants(&text) {
             Ok(constants) if constants.is_empty() => continue,
@@ -269,7 +271,8 @@ fn constant_ids(root: &Path, files: &[String], errors: &mut String) -> String {
             }
         };
         let (folder, name) = file.split_once('/').unwrap_or(("", file));
-        let stem = symbol_of(name.split('.').next().unwrap_or_default()).to_ascii_lowercase();
+        let stem =
+            symbol_of(name.split_once('.').map_or(name, |(stem, _)| stem)).to_ascii_lowercase();
         let ids = folders.entry(folder).or_default();
         let _ = writeln!(
             ids,
@@ -301,7 +304,7 @@ fn constant_ids(root: &Path, files: &[String], errors: &mut String) -> String {
 /// Collects the paths of all GLSL files below `folder`, relative to `root`, with `/`.
 fn collect_files(root: &Path, folder: &Path, files: &mut Vec<String>) {
     let Ok(entries) = fs::read_dir(folder) else {
-        return;
+        return; // what names a shader that is missing does not compile
     };
     for entry in entries.flatten() {
         let path = entry.path();
@@ -315,7 +318,7 @@ fn collect_files(root: &Path, folder: &Path, files: &mut Vec<String>) {
             }
             continue;
         }
-        let extension = name.rsplit('.').next().unwrap_or_default();
+        let extension = name.rsplit_once('.').map_or("", |(_, extension)| extension);
         if (extension == "glsl" || STAGES.iter().any(|s| s.0 == extension))
             && let Ok(relative) = path.strip_prefix(root)
         {
@@ -360,6 +363,7 @@ fn jobs_of_file(file: &str, extension: &str, text: &str, jobs: &mut Vec<Job>, er
                 };
                 job.defines.push((key.to_owned(), value));
             } else if word == "-S" {
+                // No stage has the empty name.
                 let stage = words.next().unwrap_or_default();
                 if STAGES.iter().any(|s| s.0 == stage) {
                     job.stage = stage.to_owned();
@@ -435,7 +439,7 @@ fn gather(roots: &Roots, file: &str, seen: &mut BTreeSet<String>, text: &mut Str
         return;
     }
     let Ok(source) = roots.read(file) else {
-        return;
+        return; // the compiler reports it
     };
     let _ = writeln!(text, "{file}\n{source}");
     for line in source.lines() {

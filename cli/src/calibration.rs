@@ -91,7 +91,7 @@ pub fn run(args: &CalibrationArgs) -> Result<()> {
         let hidden = args.hide_entities.then(|| hide_entities(&mut world));
         let bar = ProgressBar::new(100).with_message(map.clone());
         bar.set_style(ProgressStyle::with_template("{bar:40} {pos} % {msg}")?);
-        relight::calibrate_with(&mut world, &calibrate, &mut |done| {
+        let report = &relight::calibrate_with(&mut world, &calibrate, &mut |done| {
             bar.set_position((done * 100.0) as u64);
         });
         bar.finish_and_clear();
@@ -100,9 +100,6 @@ pub fn run(args: &CalibrationArgs) -> Result<()> {
         for warning in &world.warnings {
             log::warn!("{warning}");
         }
-        let Some(report) = &world.calibration else {
-            continue;
-        };
         if args.json {
             println!("{}", as_json(map, report, found.as_ref(), spots));
         } else {

@@ -28,6 +28,7 @@ fn pictures(args: &LightsArgs, map: &str) -> Vec<PathBuf> {
     if !args.output.is_empty() {
         return args.output.clone();
     }
+    // A path that ends in `..` has no name, and is no map.
     let stem = Path::new(map).file_stem().unwrap_or_default();
     let stem = stem.to_string_lossy();
     ["png", "svg"]

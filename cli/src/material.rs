@@ -231,7 +231,7 @@ impl Report {
         };
         let empty = serde_json::Map::new();
         let material = self.material.as_object().unwrap_or(&empty);
-        println!("{}", material.get("name").map(text).unwrap_or_default());
+        println!("{}", text(&self.material["name"]));
         let row = |name: &str, value: String| println!("  {name:12} {value}");
         match material.get("script") {
             Some(script) => row("defined in", text(script)),
@@ -263,8 +263,9 @@ impl Report {
                 row(key, text(value));
             }
         }
-        let stages = material.get("stages").and_then(Value::as_array);
-        let stages = stages.map(Vec::as_slice).unwrap_or_default();
+        let stages = self.material["stages"]
+            .as_array()
+            .map_or(&[][..], Vec::as_slice);
         row("stages", stages.len().to_string());
         for (at, stage) in stages.iter().enumerate() {
             let fields = stage.as_object().into_iter().flatten();
@@ -324,7 +325,7 @@ fn source(files: &dyn GameFiles, material: &WorldMaterial) -> Vec<Line> {
     let mut depth = 0i64;
     let mut lines = Vec::new();
     for (number, line) in (1u32..).zip(text.lines()).skip(first as usize - 1) {
-        let code = line.split("//").next().unwrap_or_default();
+        let code = line.split_once("//").map_or(line, |(code, _)| code);
         let count = |brace| code.matches(brace).count() as i64;
         let opened = depth > 0 || count('{') > 0;
         depth += count('{') - count('}');

@@ -39,10 +39,9 @@ pub fn write_png(path: &Path, rgb: &[u8], width: u32, height: u32) -> Result<()>
 /// The file cannot be read or is no image.
 pub fn read(path: &Path) -> Result<Rgb8> {
     let file = path.display().to_string();
-    let extension = path
-        .extension()
-        .map(|e| e.to_string_lossy().to_lowercase())
-        .unwrap_or_default();
+    // No format has the empty extension.
+    let extension = path.extension().unwrap_or_default();
+    let extension = extension.to_string_lossy().to_lowercase();
     let bytes = std::fs::read(path).with_context(|| file.clone())?;
     let picture = relight::image::decode(&file, &extension, &bytes)?;
     let rgb = picture

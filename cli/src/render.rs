@@ -293,10 +293,7 @@ impl RenderArgs {
             let mut shots = Vec::new();
             for number in 0..count {
                 let at = number * (points.len() - 1) / (count - 1).max(1);
-                let drawn = points.get(at).map(shot);
-                let Some(Shot { def, .. }) = drawn else {
-                    continue;
-                };
+                let def = points[at].ref_def(width, height);
                 for sample in 1..=self.samples() {
                     shots.push(Shot {
                         def,
@@ -363,6 +360,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
             relight::sample::MAP.to_owned(),
         )
     } else {
+        // `clap` demands a map without `--sample`.
         open(args.map.as_deref().unwrap_or_default(), &args.game)?
     };
     let (width, height) = args.size;

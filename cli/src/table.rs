@@ -42,6 +42,7 @@ pub fn folders(
     }
     let mut header = vec!["picture".to_owned()];
     for folder in folders {
+        // A path that ends in `..` has no name.
         let name = folder.file_name().unwrap_or_default().to_string_lossy();
         header.extend([
             format!("{name} SSIM"),
@@ -116,8 +117,8 @@ fn names(folder: &Path) -> Result<Vec<String>> {
     let mut names = Vec::new();
     for entry in std::fs::read_dir(folder).with_context(|| folder.display().to_string())? {
         let name = entry?.file_name().to_string_lossy().into_owned();
-        let extension = Path::new(&name).extension().unwrap_or_default();
-        if ["tga", "png", "jpg"].iter().any(|e| extension == *e) {
+        let extension = Path::new(&name).extension();
+        if extension.is_some_and(|e| e == "tga" || e == "png" || e == "jpg") {
             names.push(name);
         }
     }

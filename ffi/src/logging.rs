@@ -77,7 +77,7 @@ pub fn install() {
     });
 }
 
-/// Position of the last panic, as ` (file:line)`, or empty.
+/// Position of the last panic, as ` (file:line)`, or empty if it is not known.
 pub fn take_panic_place() -> String {
     PANIC_PLACE
         .lock()

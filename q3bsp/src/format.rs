@@ -225,7 +225,7 @@ fn has_advertisements(bytes: &[u8]) -> bool {
         .min();
     let header = Format::QuakeLive.header_bytes() as i64;
     let Some(entry) = entry(Lump::ALL.len()) else {
-        return false;
+        return false; // the file ends before it
     };
     first_data.is_some_and(|first| first >= header)
         && entry.length > 0

@@ -378,7 +378,7 @@ fn truncation_anywhere_is_an_error() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(testkit::cases(60))]
 
     #[test]
     fn pokes_are_survived(

@@ -56,7 +56,7 @@ fn every_word_may_be_anything() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(testkit::cases(300))]
 
     #[test]
     fn several_pokes_at_once(pokes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..20)) {

@@ -108,7 +108,7 @@ fn skins_are_tolerant() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(testkit::cases(256))]
 
     #[test]
     fn several_pokes_at_once(pokes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..20)) {

@@ -302,7 +302,7 @@ fn formats_that_engines_refuse_are_refused() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(testkit::cases(256))]
 
     #[test]
     fn several_pokes_at_once(

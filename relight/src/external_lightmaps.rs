@@ -29,7 +29,7 @@ pub fn external_lightmaps(
     for number in 0..MOST {
         let path = format!("{stem}/lm_{number:04}");
         let Some((picture, path)) = image::load(files, &path).map_err(|e| e.to_string())? else {
-            break;
+            break; // the numbers have no gaps
         };
         let same = pages
             .first()

@@ -325,13 +325,11 @@ impl RelitWorld {
                 continue;
             };
             for triangle in surface.triangles() {
-                let Some([a, b, c]) = self.triangle(triangle) else {
-                    continue;
-                };
+                let corners = self.corners(triangle);
+                let [a, b, c] = corners.map(|v| v.position);
                 let area = (b - a).cross(c - a).length() * 0.5;
-                let indices = self.indices.iter().skip(triangle * 3).take(3);
-                let colors = indices.filter_map(|&i| Some(self.vertices.get(i as usize)?.color));
-                let color: Vec4 = colors.map(|c| Vec4::from_array(c.map(f32::from))).sum();
+                let colors = corners.map(|v| Vec4::from_array(v.color.map(f32::from)));
+                let color: Vec4 = colors.iter().sum();
                 *sum += color * (area / 3.0);
                 *whole += area;
             }
@@ -362,7 +360,7 @@ impl RelitWorld {
     pub fn surface_area(&self, surface: &WorldSurface) -> f32 {
         let triangles = surface.triangles();
         triangles
-            .filter_map(|t| self.triangle(t))
+            .map(|t| self.triangle(t))
             .map(|[a, b, c]| (b - a).cross(c - a).length() * 0.5)
             .sum()
     }

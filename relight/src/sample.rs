@@ -282,6 +282,7 @@ fn rectangle(center: Vec3, right: Vec3, up: Vec3) -> [Vec3; 4] {
 fn light(map: &mut MapBuilder, surfaces: &[usize]) {
     for &surface in surfaces {
         let [a, b, .., d] = map.vertices_mut(surface) else {
+            debug_assert!(false, "surface {surface} is no rectangle");
             continue;
         };
         // the page covers the rectangle: find the position of a texel from three corners

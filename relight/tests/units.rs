@@ -23,10 +23,7 @@ impl Occluders {
                 for triangle in
                     surface.first_index / 3..(surface.first_index + surface.num_indices) / 3
                 {
-                    triangles.push((
-                        world.triangle(triangle as usize).unwrap(),
-                        material.is_sky(),
-                    ));
+                    triangles.push((world.triangle(triangle as usize), material.is_sky()));
                 }
             }
         }

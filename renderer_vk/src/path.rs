@@ -96,8 +96,7 @@ impl PathPoint {
 pub fn parse(text: &str) -> Result<Vec<PathPoint>, PathError> {
     let mut points = Vec::new();
     for (index, full) in text.lines().enumerate() {
-        // `split` yields at least one part.
-        let line = full.split('#').next().unwrap_or_default().trim();
+        let line = full.split_once('#').map_or(full, |(line, _)| line).trim();
         if line.is_empty() {
             continue;
         }

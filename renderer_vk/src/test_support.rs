@@ -3,9 +3,10 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use glam::Vec4;
+use glam::{Vec3, Vec4};
 use relight::image::{self, Image};
 use relight::{GameFiles, MemoryFiles, RelitWorld, SearchPath};
+use shaders::types::Vertex;
 
 use crate::assets::{ImageFlags, ImageSource, MaterialSettings, Materials, Models, Skins};
 use crate::gpu;
@@ -22,6 +23,14 @@ pub struct FakeTextures {
     pub flags: HashMap<String, ImageFlags>,
     /// Number of lightmap pages made.
     pub lightmaps: usize,
+}
+
+/// A vertex at a place.
+pub fn vertex(x: f32, y: f32, z: f32) -> Vertex {
+    Vertex {
+        position: Vec3::new(x, y, z),
+        ..Vertex::default()
+    }
 }
 
 pub const WHITE: u32 = 1;

@@ -26,6 +26,15 @@ flareShader { cull none
     rgbGen vertex } }
 ";
 
+/// Shadow volumes and flares.
+fn effects() -> Settings {
+    Settings {
+        flares: true,
+        shadows: ModelShadows::Volumes,
+        ..Settings::full_size()
+    }
+}
+
 /// A renderer of small pictures in a room 512 units wide with a flare on its +x wall and a door beside it; `None`, with
 /// a printed line, without a device.
 struct Stage {
@@ -108,15 +117,6 @@ fn box_model() -> Vec<u8> {
             Vec3::new(side(0), side(1), side(2))
         })
         .collect();
-    // clockwise seen from outside
-    let faces = [
-        [0, 1, 3, 2],
-        [4, 6, 7, 5],
-        [0, 4, 5, 1],
-        [2, 3, 7, 6],
-        [0, 2, 6, 4],
-        [1, 5, 7, 3],
-    ];
     Md3 {
         name: "box".into(),
         frames: vec![Frame {
@@ -131,10 +131,7 @@ fn box_model() -> Vec<u8> {
         surfaces: vec![Surface {
             name: "body".into(),
             shaders: vec!["t/body".into()],
-            triangles: faces
-                .iter()
-                .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-                .collect(),
+            triangles: testkit::cube_triangles().collect(),
             st: vec![Vec2::ZERO; 8],
             vertices: corners
                 .iter()
@@ -256,12 +253,7 @@ fn flares_fade_in_where_they_can_be_seen_and_out_where_not() {
 
 #[test]
 fn several_samples_smooth_edges_along_with_shadows_and_flares() {
-    let settings = Settings {
-        flares: true,
-        shadows: ModelShadows::Volumes,
-        ..Settings::full_size()
-    };
-    let Some(mut stage) = Stage::new(settings) else {
+    let Some(mut stage) = Stage::new(effects()) else {
         return;
     };
     // turned, so that edges are not along the pixels
@@ -365,12 +357,7 @@ fn a_device_with_nothing_optional_draws_all_but_what_needs_it() {
 
 #[test]
 fn no_descriptor_is_written_while_drawing() {
-    let settings = Settings {
-        flares: true,
-        shadows: ModelShadows::Volumes,
-        ..Settings::full_size()
-    };
-    let Some(mut stage) = Stage::new(settings) else {
+    let Some(mut stage) = Stage::new(effects()) else {
         return;
     };
     let before = stage.renderer.descriptor_writes();

@@ -255,7 +255,7 @@ fn write_docs(text: &mut String, indent: &str, docs: &[String]) {
 pub fn specialization_constants(text: &str) -> Result<Vec<(String, u32)>, String> {
     let mut found = Vec::new();
     for (index, line) in text.lines().enumerate() {
-        let code = line.split("//").next().unwrap_or_default();
+        let code = line.split_once("//").map_or(line, |(code, _)| code);
         if !code.contains("constant_id") {
             continue;
         }

@@ -113,7 +113,7 @@ fn script_text() -> impl Strategy<Value = Vec<u8>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(512))]
+    #![proptest_config(testkit::cases(512))]
 
     #[test]
     fn any_text_is_read_and_evaluated(

@@ -4,6 +4,7 @@
 
 use crate::aabb::Aabb;
 use crate::simd4::WIDE;
+use crate::slice::{item, part, part_mut, span};
 
 /// Bins on an axis.
 const BINS: usize = 16;
@@ -85,7 +86,7 @@ impl std::ops::Deref for WideChildren {
     type Target = [Child];
 
     fn deref(&self) -> &[Child] {
-        self.list.get(..self.count).unwrap_or_default()
+        part(&self.list, ..self.count)
     }
 }
 
@@ -123,8 +124,8 @@ impl Hierarchy {
             parent: None,
         }];
         while let Some(task) = tasks.pop() {
-            let entries = order.get_mut(task.first..task.first + task.count);
-            let left = split(entries.unwrap_or_default(), boxes, &task, leaf);
+            let entries = part_mut(&mut order, task.first..task.first + task.count);
+            let left = split(entries, boxes, &task, leaf);
             // the root is a node even if all entries fit into one leaf
             if left.is_none() && task.parent.is_some() {
                 attach(&mut nodes, &task, index(task.first), index(task.count));
@@ -137,7 +138,7 @@ impl Hierarchy {
             let mut first = task.first;
             for (side, count) in [left, task.count - left].into_iter().enumerate() {
                 if count > 0 {
-                    let members = order.get(first..first + count).unwrap_or_default();
+                    let members = part(&order, first..first + count);
                     tasks.push(Task {
                         first,
                         count,
@@ -158,18 +159,14 @@ impl Hierarchy {
         // children come behind their parents
         for index in (0..self.nodes.len()).rev() {
             for side in 0..2 {
-                let Some(&child) = self.nodes.get(index).and_then(|node| node.get(side)) else {
-                    continue;
-                };
+                let child = self.nodes[index][side];
                 let bounds = if child.is_node() {
                     self.node_bounds(child.first)
                 } else {
                     union_of(self.entries(&child), boxes)
                 };
-                if !child.is_absent()
-                    && let Some(node) = self.nodes.get_mut(index)
-                {
-                    node[side].bounds = bounds;
+                if !child.is_absent() {
+                    self.nodes[index][side].bounds = bounds;
                 }
             }
         }
@@ -193,9 +190,7 @@ impl Hierarchy {
 
     /// The entries of a leaf.
     pub fn entries(&self, leaf: &Child) -> &[u32] {
-        let first = leaf.first as usize;
-        let entries = self.order.get(first..first + leaf.count as usize);
-        entries.unwrap_or_default()
+        part(&self.order, span(leaf.first, leaf.count))
     }
 
     /// The box of everything.
@@ -250,7 +245,7 @@ impl Hierarchy {
             let area = |c: &Child| c.bounds.half_area();
             let nodes = found.iter().enumerate().filter(|(_, c)| c.is_node());
             let Some((largest, _)) = nodes.max_by(|a, b| area(a.1).total_cmp(&area(b.1))) else {
-                break;
+                break; // leaves alone
             };
             let opened = found.list[largest];
             found.count -= 1;
@@ -261,9 +256,9 @@ impl Hierarchy {
     }
 }
 
-/// The box of an entry; empty for none.
+/// The box of an entry.
 fn box_of(entry: u32, boxes: &[Aabb]) -> Aabb {
-    boxes.get(entry as usize).copied().unwrap_or_default()
+    item(boxes, entry as usize)
 }
 
 fn union_of(entries: &[u32], boxes: &[Aabb]) -> Aabb {

@@ -1,4 +1,16 @@
-//! Damage to files.
+//! Damage to files, and the settings of property tests.
+
+use proptest::test_runner::{Config, FileFailurePersistence};
+
+/// Settings of property tests of so many cases. A seed that fails is kept in `regressions/`, and runs first from then on.
+pub fn cases(cases: u32) -> Config {
+    let seeds = concat!(env!("CARGO_MANIFEST_DIR"), "/../regressions/proptest.txt");
+    Config {
+        cases,
+        failure_persistence: Some(Box::new(FileFailurePersistence::Direct(seeds))),
+        ..Config::default()
+    }
+}
 
 /// Replaces the 32-bit word at each of these offsets of a file by each of these values, and calls `survive`, which
 /// returns whether the file was accepted.

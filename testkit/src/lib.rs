@@ -1,6 +1,6 @@
 //! What the tests of several crates share: game data or a skipped test ([`game`], [`folder`]), a Vulkan device or a
-//! skipped test ([`device()`]), the report of a skipped test ([`skip`]), a seeded random generator ([`Random`]), damage to files ([`poke_words`]), and the timing of
-//! benchmarks ([`mod@bench`]).
+//! skipped test ([`device()`]), the report of a skipped test ([`skip`]), a seeded random generator ([`Random`]), damage to files ([`poke_words`]), the
+//! settings of property tests ([`cases`]), a cube ([`cube_triangles`]), and the timing of benchmarks ([`mod@bench`]).
 //!
 //! # Game data
 //!
@@ -28,7 +28,7 @@ use std::sync::OnceLock;
 use zip::ZipArchive;
 use zip::result::ZipError;
 
-pub use hostile::poke_words;
+pub use hostile::{cases, poke_words};
 pub use skips::{Need, absent, assert_optional, device, is_set, skip};
 pub use support::random::Random;
 
@@ -49,6 +49,19 @@ pub const PACKS: [(&str, u64); 9] = [
     ("pak6-patch085.pk3", 38_494_560),
     ("pak6-patch088.pk3", 73_194_614),
 ];
+
+/// The triangles of a cube whose corners bits 0, 1, 2 of their number place, clockwise seen from outside.
+pub fn cube_triangles() -> impl Iterator<Item = [u32; 3]> {
+    let faces = [
+        [0, 1, 3, 2],
+        [4, 6, 7, 5],
+        [0, 4, 5, 1],
+        [2, 3, 7, 6],
+        [0, 2, 6, 4],
+        [1, 5, 7, 3],
+    ];
+    (faces.into_iter()).flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]])
+}
 
 /// An installed OpenArena.
 #[derive(Debug)]

@@ -105,7 +105,7 @@ fn print_lumps(info: &MapInfo) {
         println!(
             "    {:14} {:>9} {:>10} bytes at {}",
             lump.name,
-            records.unwrap_or_default(),
+            records.unwrap_or_default(), // blank for bytes and text
             lump.bytes,
             lump.offset
         );

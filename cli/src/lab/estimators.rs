@@ -248,9 +248,7 @@ fn row(line: &Value) {
     let noise = |path: &str| line.pointer(path).and_then(Value::as_f64).unwrap_or(0.0);
     println!(
         "{:<18} {:>6} {:>9.3} % {:>7.1} {:>9.2} % {:>7.1} {:>9.3} {:>9.3} {:>9.3} {:>9.2}",
-        line.get("estimator")
-            .and_then(Value::as_str)
-            .unwrap_or_default(),
+        line["estimator"].as_str().unwrap_or("?"),
         number("frames"),
         number("difference") * 100.0,
         number("standard_errors"),

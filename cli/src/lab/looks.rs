@@ -189,6 +189,7 @@ fn one(args: &LooksArgs, map: &str) -> Result<Sums> {
     let chosen = args.set.change([], Settings::full_size());
     let settings = |look: Option<MapLightChoice>| Settings {
         rt: look.is_some(),
+        // The classic look does not read it.
         rt_lights: look.unwrap_or_default(),
         rt_accumulate: !args.no_accumulation,
         rt_auto_exposure: !args.fixed_exposure,
@@ -239,11 +240,9 @@ fn one(args: &LooksArgs, map: &str) -> Result<Sums> {
         }
     }
     for pictures in &pictures {
-        let Some((classic, traced)) = pictures.split_first() else {
-            continue;
-        };
-        for (picture, color) in traced.iter().zip(&mut sums.color) {
-            color.add(picture, classic);
+        // The first is of the classic look.
+        for (picture, color) in pictures.iter().skip(1).zip(&mut sums.color) {
+            color.add(picture, &pictures[0]);
         }
     }
     if let Some(folder) = &args.output {

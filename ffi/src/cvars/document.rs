@@ -17,7 +17,8 @@ fn line(spec: &Spec) -> String {
         flags::NONE => "–".to_owned(),
         _ => spec.letters(),
     };
-    let help = spec.help.split(" Kept for old").next().unwrap_or_default();
+    let help = spec.help.split_once(" Kept for old");
+    let help = help.map_or(spec.help, |(help, _)| help);
     let range = match (spec.range, spec.kind) {
         (Some(range), kind) if range.by_engine => {
             let whole = if kind == Kind::Whole { ", whole" } else { "" };

@@ -68,7 +68,7 @@ pub fn apply(cvars: &Cvars, settings: &mut Settings) {
 pub fn write_back_limits(cvars: &Cvars) {
     for Registered { row, variable, .. } in &cvars.settings {
         let (Some(variable), Some(range)) = (variable, row.spec.range) else {
-            continue;
+            continue; // the engine did not take it, or it has no limits
         };
         let value = number(cvars.engine, *variable);
         let limit = value.clamp(range.min, range.max);

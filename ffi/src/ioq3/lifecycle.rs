@@ -168,6 +168,7 @@ fn make_renderer(
         window,
         validation: cvars.flag(Cvar::VkValidation),
         device: wanted_device(cvars),
+        // Off without a session.
         vsync: session::with(|session| session.front.settings.swap_interval != 0)
             .unwrap_or_default(),
         pipeline_cache: cache_folder.map(|folder| folder.join("pipelines.cache")),

@@ -181,7 +181,7 @@ fn words_after(address: usize) -> Vec<usize> {
     let read = std::fs::File::open("/proc/self/mem")
         .and_then(|memory| memory.read_at(&mut bytes, address as u64))
         .unwrap_or(0);
-    let (words, _) = bytes.get(..read).unwrap_or_default().as_chunks();
+    let (words, _) = bytes[..read].as_chunks();
     words.iter().copied().map(usize::from_ne_bytes).collect()
 }
 

@@ -334,8 +334,7 @@ unsafe extern "C" fn debug_polygon(color: c_int, count: c_int, points: *mut c_fl
             *corner = unsafe { convert::vector(points.cast::<Vec3C>().add(i)) };
         }
         draw(|renderer, _| {
-            let corners = corners.get(..count).unwrap_or_default();
-            renderer.add_debug_polygon(color.cast_unsigned(), corners);
+            renderer.add_debug_polygon(color.cast_unsigned(), &corners[..count]);
             Ok(())
         })
     });

@@ -114,6 +114,7 @@ impl Services for Ioq3 {
 
     fn cvar_set(&self, name: &CStr, value: &str) {
         let Ok(value) = CString::new(value) else {
+            debug_assert!(false, "{value:?} contains a NUL");
             return;
         };
         if let Some(f) = self.get(|t| t.Cvar_Set) {

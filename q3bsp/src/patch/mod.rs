@@ -54,10 +54,8 @@ impl PatchMesh {
         let columns = used_lines(self.width, &self.column_errors, max_error);
         let rows = used_lines(self.height, &self.row_errors, max_error);
         let mut out = Vec::with_capacity(rows.len() * columns.len() * 6);
-        for row in rows.windows(2) {
-            let &[top, bottom] = row else { continue };
-            for column in columns.windows(2) {
-                let &[left, right] = column else { continue };
+        for (&top, &bottom) in rows.iter().zip(rows.iter().skip(1)) {
+            for (&left, &right) in columns.iter().zip(columns.iter().skip(1)) {
                 let at = |row: usize, column: usize| {
                     u32::try_from(row * self.width + column).unwrap_or(u32::MAX)
                 };

@@ -379,6 +379,7 @@ fn share_between(from: usize, to: usize, grids: &mut [Grid<'_>], budget: &mut Bu
         None => return false,
     };
     let Some(grid) = grids.get_mut(to) else {
+        debug_assert!(false, "grid {to} met another and does not exist");
         return false;
     };
     for &(edge, l, error) in &copies {
@@ -400,6 +401,7 @@ fn shared_errors(a: &PatchMesh, b: &PatchMesh) -> Vec<(Edge, usize, f32)> {
         let errors = a.edge_errors(from_edge).iter().enumerate();
         for (k, &error) in errors.take(last).skip(1) {
             let Some(point) = a.edge_point(from_edge, k) else {
+                debug_assert!(false, "an edge has an error and no point {k}");
                 continue;
             };
             for edge in EDGES {

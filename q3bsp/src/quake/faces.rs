@@ -170,14 +170,9 @@ impl QuakeMap {
         let texinfo = self.texinfo_of(element, face)?;
         let normal = self.normal(element, face)?;
         let mut corners = self.corners(element, face)?;
-        let winding: Vec3 = corners
-            .windows(2)
-            .filter_map(|pair| {
-                let &[a, b] = pair else { return None };
-                let origin = *corners.first()?;
-                Some((b - origin).cross(a - origin))
-            })
-            .sum();
+        let origin = corners.first().map_or(Vec3::ZERO, |&first| first);
+        let edges = corners.iter().zip(corners.iter().skip(1));
+        let winding: Vec3 = edges.map(|(a, b)| (b - origin).cross(a - origin)).sum();
         if winding.dot(normal) < 0.0 {
             corners.reverse();
         }
@@ -192,6 +187,7 @@ impl QuakeMap {
         let mut mean = None;
         if lit && let Some(extent) = &extent {
             for (at, &style) in styles.enumerate() {
+                // The lump ends before the texels of this style.
                 let Some(texels) = self.light_texels(face, extent, at) else {
                     break;
                 };
@@ -220,7 +216,7 @@ impl QuakeMap {
         };
         let on_page = |coordinates: &[f64; 2], layer: usize| -> Vec2 {
             let (Some(extent), Some((_, x, y))) = (&extent, place(layer)) else {
-                return Vec2::ZERO;
+                return Vec2::ZERO; // without light
             };
             let at = |coordinate: f64, first: f64, start: i32| {
                 let cell = coordinate / LUXEL - first;

@@ -336,6 +336,7 @@ impl Reader<'_> {
             brushes: self.records(Lump::Brushes)?,
             brush_sides: self.records(Lump::BrushSides)?,
             others: kept.filter(|(_, data)| !data.is_empty()).collect(),
+            // Most files end where their lumps do.
             appendix: self.bytes.get(end..).unwrap_or_default().to_vec(),
             directory: self.directory,
         })

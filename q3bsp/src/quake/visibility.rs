@@ -90,10 +90,7 @@ impl QuakeMap {
         let mut visibility = Visibility::new(clusters);
         let mut broken = 0;
         for (cluster, row) in visibility.rows.chunks_exact_mut(stride).enumerate() {
-            let used = clusters.div_ceil(8).min(row.len());
-            let Some(row) = row.get_mut(..used) else {
-                continue;
-            };
+            let (row, _) = row.split_at_mut(clusters.div_ceil(8).min(stride));
             let data = self
                 .row_start(cluster)
                 .and_then(|at| self.visibility.get(at..));

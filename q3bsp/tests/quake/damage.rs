@@ -111,7 +111,7 @@ fn every_word_may_be_anything() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(testkit::cases(60))]
 
     #[test]
     fn pokes_and_cuts_are_survived(

@@ -155,7 +155,7 @@ fn trace_from(
         let radius = y.sqrt();
         let ray = u * (radius * cos) + v * (radius * sin) + sample.normal * (1.0 - y).sqrt();
         let Some(hit) = occluders.nearest(sample.position, ray, f32::INFINITY) else {
-            continue;
+            continue; // the ray leaves the map
         };
         let Some((index, material)) = material_of(world, of_triangle, &hit) else {
             continue;
@@ -201,8 +201,8 @@ fn material_of<'a>(
     of_triangle: &[u32],
     hit: &Hit,
 ) -> Option<(u32, &'a WorldMaterial)> {
-    let surface = *of_triangle.get(hit.tag as usize)?;
-    let index = world.surfaces.get(surface as usize)?.material;
+    let surface = *slice::get(of_triangle, hit.tag as usize)?;
+    let index = slice::get(&world.surfaces, surface as usize)?.material;
     Some((index, slice::get(&world.materials, index as usize)?))
 }
 

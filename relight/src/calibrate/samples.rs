@@ -144,7 +144,7 @@ fn area(world: &RelitWorld, is: fn(&WorldSurface) -> bool) -> f64 {
         .filter(|s| is(s) && is_measurable(world, s));
     let triangles = measurable.flat_map(|surface| surface.triangles());
     let areas = triangles.filter_map(|triangle| {
-        let [a, b, c] = world.triangle(triangle)?;
+        let [a, b, c] = world.triangle(triangle);
         Some(f64::from((b - a).cross(c - a).length() * 0.5)).filter(|area| area.is_finite())
     });
     areas.sum()
@@ -175,7 +175,7 @@ impl<'a> SampleContext<'a> {
         }
     }
 
-    /// Divides a [sample](sample_at) by the part of its light that the compiler's dirt left.
+    /// Divides a [sample](sample_at) by the part of its light that the compiler's dirt left, if it computed dirt.
     pub fn remove_dirt(&self, sample: &mut Sample) {
         let Some(dirt) = self.dirt else {
             return;

@@ -152,7 +152,7 @@ impl Layer {
         for surface in &world.surfaces {
             let main = usize::try_from(surface.light_page).ok();
             let Some(size) = main.and_then(|page| Some(world.page(page)?.size())) else {
-                continue;
+                continue; // lit by vertex
             };
             let page = pages.entry(surface.light_page);
             let page = page.or_insert_with(|| vec![0; size * size * 3]);

@@ -46,7 +46,7 @@ pub(super) fn find(
     }
     let subset = fitted_subset(samples);
     let Some(first) = best_direction(occluders, samples, &subset, &state) else {
-        return;
+        return; // no sun reduces the error
     };
     let mut direction = refine(occluders, samples, &subset, &state, first);
     let known = columns.len();
@@ -62,7 +62,7 @@ pub(super) fn find(
             prior: None,
         });
         let mut state = solve(samples, columns, ambient, effort, cutoff);
-        let Some(sun) = columns.last() else {
+        let Some(sun) = slice::get(columns, known) else {
             return;
         };
         if worth(sun, &state) < worthwhile {

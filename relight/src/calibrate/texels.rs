@@ -146,6 +146,7 @@ pub(super) fn take(
     for stratum in 0..strata {
         for _ in 0..TRIES {
             let at = (stratum as f64 + f64::from(random.uniform())) / strata as f64;
+            // Its centre may be off the surface.
             let Some(found) = density_map.texel_at(at, random) else {
                 continue;
             };
@@ -215,9 +216,7 @@ impl<'a> SampleDensity<'a> {
             let page = page.and_then(|page| world.page(page));
             let side = page.map_or(0.0, |page| page.size() as f32);
             for triangle in surface.triangles() {
-                let Some(corners) = world.corners(triangle) else {
-                    continue;
-                };
+                let corners = world.corners(triangle);
                 let [a, b, c] = corners.map(|c| c.position);
                 let [s, t, u] = corners.map(|c| c.lightmap * side);
                 let area = (b - a).cross(c - a).length() * 0.5;
@@ -294,7 +293,7 @@ fn texel(
     surface: &WorldSurface,
     random: &mut Random,
 ) -> Option<Texel> {
-    let [a, b, c] = world.corners(triangle)?.map(|c| c.lightmap);
+    let [a, b, c] = world.corners(triangle).map(|c| c.lightmap);
     let (u, v) = random.in_triangle();
     texel_at(world, triangle, surface, a + (b - a) * u + (c - a) * v)
 }
@@ -317,7 +316,7 @@ fn texel_at(
     let others = surface.triangles();
     let place = std::iter::once(triangle)
         .chain(others)
-        .find_map(|t| place_of(world.corners(t)?, middle, size))?;
+        .find_map(|t| place_of(world.corners(t), middle, size))?;
     let scale = stored_scale(world, surface);
     Some(Texel {
         id: [number as u32, cell.x as u32, cell.y as u32],
@@ -371,7 +370,7 @@ fn page_place(world: &RelitWorld, surface: usize, triangle: usize, at: Vec3) -> 
     if !lit_by_texel(own) || !is_measurable(world, own) || !constant(world, surface) {
         return None;
     }
-    let [a, b, c] = world.corners(triangle)?;
+    let [a, b, c] = world.corners(triangle);
     let (e1, e2, offset) = (
         b.position - a.position,
         c.position - a.position,
@@ -403,7 +402,7 @@ fn stored_scale(world: &RelitWorld, surface: &WorldSurface) -> f32 {
 
 /// Position and normal of a page position, in texels, if the triangle covers it. `size`: texels along the side of
 /// the page.
-fn place_of([a, b, c]: [&WorldVertex; 3], at: Vec2, size: f32) -> Option<(Vec3, Vec3)> {
+fn place_of([a, b, c]: [WorldVertex; 3], at: Vec2, size: f32) -> Option<(Vec3, Vec3)> {
     let (e1, e2) = (
         (b.lightmap - a.lightmap) * size,
         (c.lightmap - a.lightmap) * size,

@@ -34,7 +34,7 @@ pub(super) fn contributions(
     let scale = sample.level() + sample.floor;
     for &entry in world.light_lists.row(sample.cluster) {
         let LightRef::Triangle(index) = world.light_lists.light(entry) else {
-            continue;
+            continue; // a point light has a column of its own
         };
         let (Some(light), Some(&(group, part))) = (
             world.lights.get(index as usize),

@@ -124,9 +124,7 @@ fn convolve(values: &[f64], width: usize, height: usize, kernel: &[f64]) -> Vec<
     let mut out = Vec::with_capacity(width * height);
     let mut padded = Vec::with_capacity(width + 2 * reach);
     for row in values.chunks_exact(width.max(1)) {
-        let (Some(&first), Some(&last)) = (row.first(), row.last()) else {
-            continue;
-        };
+        let (first, last) = (row[0], row[row.len() - 1]);
         padded.clear();
         padded.extend(std::iter::repeat_n(first, reach));
         padded.extend_from_slice(row);

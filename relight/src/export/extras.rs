@@ -19,16 +19,10 @@ pub fn material(material: &WorldMaterial) -> Value {
         "class": format!("{:?}", material.class.class),
         "stages": shader.stages.iter().map(stage).collect::<Vec<_>>(),
     });
-    let Value::Object(map) = &mut out else {
-        return out;
-    };
     let definition = material.resolved.definition();
     if material.resolved.script.is_some() {
         let place = &definition.location;
-        map.insert(
-            "script".into(),
-            json!(format!("{}:{}", place.file, place.line)),
-        );
+        out["script"] = json!(format!("{}:{}", place.file, place.line));
     }
     if !material.baked.styles.is_empty() {
         let style = |style: &StyleLight| {
@@ -38,19 +32,19 @@ pub fn material(material: &WorldMaterial) -> Value {
             })
         };
         let styles: Vec<_> = material.baked.styles.iter().map(style).collect();
-        map.insert("lightStyles".into(), json!(styles));
+        out["lightStyles"] = json!(styles);
     }
     if let Some(fault) = &material.resolved.fault {
-        map.insert("fault".into(), json!(fault));
+        out["fault"] = json!(fault);
     }
-    directives(definition, map);
+    directives(definition, &mut out);
     out
 }
 
 /// Keywords of a script outside its stages, without those at their defaults.
-fn directives(shader: &Shader, map: &mut Map<String, Value>) {
+fn directives(shader: &Shader, out: &mut Value) {
     let mut put = |key: &str, value: Value| {
-        map.insert(key.to_owned(), value);
+        out[key] = value;
     };
     if !shader.surface_params.is_empty() {
         put("surfaceParams", json!(shader.surface_params));

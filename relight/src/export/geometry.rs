@@ -63,11 +63,7 @@ pub struct Mesh {
 
 impl Part {
     /// The triangles that are `picked`, moved along their vertices' normals, and which vertex here each of theirs was.
-    pub fn lifted(
-        &self,
-        by: f32,
-        picked: &dyn Fn([&WorldVertex; 3]) -> bool,
-    ) -> (Part, Vec<usize>) {
+    pub fn lifted(&self, by: f32, picked: &dyn Fn([WorldVertex; 3]) -> bool) -> (Part, Vec<usize>) {
         let mut numbers: HashMap<u32, u32> = HashMap::new();
         let mut out = Part {
             material: self.material,
@@ -76,18 +72,16 @@ impl Part {
         };
         let mut from = Vec::new();
         for corners in self.indices.as_chunks::<3>().0 {
-            let [Some(a), Some(b), Some(c)] = corners.map(|i| self.vertices.get(i as usize)) else {
-                continue;
-            };
-            if !picked([a, b, c]) {
+            let triangle = corners.map(|i| item(&self.vertices, i as usize));
+            if !picked(triangle) {
                 continue;
             }
-            for (&old, vertex) in corners.iter().zip([a, b, c]) {
+            for (&old, vertex) in corners.iter().zip(triangle) {
                 let number = *numbers.entry(old).or_insert_with(|| {
                     from.push(old as usize);
                     out.vertices.push(WorldVertex {
                         position: vertex.position + vertex.normal.normalize_or_zero() * by,
-                        ..*vertex
+                        ..vertex
                     });
                     out.vertices.len() as u32 - 1
                 });
@@ -211,10 +205,7 @@ pub fn gather(world: &RelitWorld, place: &dyn Fn(&WorldSurface, Vec2) -> Vec2) -
         let indices = world.indices_of(surface);
         let rises = rises(world, indices, item(&stacked, number));
         for corners in indices.as_chunks::<3>().0 {
-            let [Some(a), Some(b), Some(c)] = corners.map(|i| world.vertices.get(i as usize))
-            else {
-                continue;
-            };
+            let [a, b, c] = corners.map(|i| item(&world.vertices, i as usize));
             if (b.position - a.position).cross(c.position - a.position) == Vec3::ZERO {
                 degenerate += 1;
                 continue;
@@ -227,7 +218,7 @@ pub fn gather(world: &RelitWorld, place: &dyn Fn(&WorldSurface, Vec2) -> Vec2) -
                     position: v.position + origin + rise,
                     st: v.st - shift,
                     lightmap: place(surface, v.lightmap),
-                    ..*v
+                    ..v
                 })
             });
             joiner.indices.extend(corner);
@@ -254,12 +245,9 @@ fn rises(world: &RelitWorld, indices: &[u32], stacked: Stacked) -> BTreeMap<u32,
     if stacked.below == 0 {
         return BTreeMap::new();
     }
-    let place = |i: u32| Some(world.vertices.get(i as usize)?.position);
+    let place = |i: u32| item(&world.vertices, i as usize).position;
     let triangles = indices.as_chunks::<3>().0.iter();
-    let triangles = triangles.filter_map(|&numbers| match numbers.map(place) {
-        [Some(a), Some(b), Some(c)] => Some((numbers, [a, b, c])),
-        _ => None,
-    });
+    let triangles = triangles.map(|&numbers| (numbers, numbers.map(place)));
     let mut rises = stacked.directions(triangles);
     for rise in rises.values_mut() {
         *rise *= RISE * stacked.below as f32;

@@ -241,6 +241,7 @@ impl ImageStore {
                 .min_by_key(|(_, (_, used))| *used)
                 .map(|(picture, _)| picture.clone());
             let Some((found, _)) = oldest.and_then(|picture| kept.images.remove(&picture)) else {
+                debug_assert!(false, "{} bytes in no image", kept.bytes);
                 break;
             };
             kept.bytes -= size(&found);

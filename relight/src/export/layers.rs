@@ -174,7 +174,7 @@ impl<'a> Layer<'a> {
         self.weighed.map(|(stage, _)| stage)
     }
 
-    /// Makes the look of the layer's material one weighted by vertex alpha.
+    /// Makes the look of the layer's material one weighted by vertex alpha, if the layer is.
     pub fn weigh(&self, source: &Export<'_>, look: &mut Look) {
         let Some((number, how)) = self.weighed else {
             return;
@@ -206,7 +206,7 @@ impl<'a> Layer<'a> {
         part: &Part,
         height: usize,
         look: &Look,
-        seen: &dyn Fn([&WorldVertex; 3]) -> bool,
+        seen: &dyn Fn([WorldVertex; 3]) -> bool,
     ) -> (Part, Vec<usize>) {
         let front = if look.reversed { -1.0 } else { 1.0 };
         part.lifted(LIFT * height as f32 * front, seen)

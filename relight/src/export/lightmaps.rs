@@ -78,6 +78,7 @@ impl Atlas {
         let mut rgba = vec![255; width * height * 4];
         for (&page, &cell) in &self.cells {
             let Some(texels) = usize::try_from(page).ok().and_then(|p| world.lightmap(p)) else {
+                debug_assert!(false, "no page {page}");
                 continue;
             };
             let texels = texels.as_chunks::<3>().0;

@@ -478,7 +478,7 @@ fn add_moving_glow(
 /// What glass and liquids do to light.
 fn dielectric(shader: &Shader, drawn: &LightLinear, look: &mut Look) {
     let Some(index) = refraction_index(shader) else {
-        return;
+        return; // neither glass nor a liquid
     };
     let transmission = drawn.through.max_element().clamp(0.0, 1.0);
     if transmission < LEAST_TRANSMISSION && shader.content_flags & CONTENTS_SLIME != 0 {

@@ -7,6 +7,7 @@ use crate::world::WorldVertex;
 use glam::{Vec2, Vec3};
 use q3bsp::Entity;
 use q3model::{Iqm, Md3, Mdr, Skin};
+use support::slice::item;
 
 /// Class of the models that a map's compiler made part of the map's surfaces.
 const COMPILED: &str = "misc_model";
@@ -180,12 +181,8 @@ fn joined(
     vertices: Vec<WorldVertex>,
     triangles: &[[u32; 3]],
 ) -> ModelSurface {
-    let corners = triangles.iter().filter_map(|corners| {
-        let [Some(a), Some(b), Some(c)] = corners.map(|i| vertices.get(i as usize)) else {
-            return None;
-        };
-        Some([*a, *b, *c])
-    });
+    let corners = triangles.iter();
+    let corners = corners.map(|corners| corners.map(|i| item(&vertices, i as usize)));
     let (part, degenerate) = geometry::join(corners);
     ModelSurface {
         name: name.to_ascii_lowercase(),

@@ -22,8 +22,8 @@ const FADES: &str = "fades by vertex alpha, which OBJ lacks; it does not fade";
 const LAYERED: &str = "is weighted by vertex alpha, which OBJ lacks; it is on triangles that it covers by half or more";
 
 /// Whether a layer covers half of a triangle or more.
-fn mostly(layer: &Layer<'_>, corners: [&WorldVertex; 3]) -> bool {
-    corners.into_iter().map(|v| layer.cover(v)).sum::<f32>() >= 1.5
+fn mostly(layer: &Layer<'_>, corners: [WorldVertex; 3]) -> bool {
+    corners.into_iter().map(|v| layer.cover(&v)).sum::<f32>() >= 1.5
 }
 
 /// Writes `NAME.obj`, `NAME.mtl` and the images.

@@ -87,11 +87,8 @@ impl System {
         atlas: &Image,
         table: &[f32; 256],
     ) {
-        let vertex = indices.map(|i| part.vertices.get(i as usize));
-        let unknown = indices.map(|i| unknowns.get(i as usize).copied());
-        let ([Some(a), Some(b), Some(c)], [Some(i), Some(j), Some(k)]) = (vertex, unknown) else {
-            return;
-        };
+        let [a, b, c] = indices.map(|i| slice::item(&part.vertices, i as usize));
+        let corners = indices.map(|i| slice::item(unknowns, i as usize));
         let area = (b.position - a.position)
             .cross(c.position - a.position)
             .length();
@@ -104,7 +101,6 @@ impl System {
         let longest = (q - p).length().max((r - q).length()).max((p - r).length());
         let steps = ((longest / SPACING).ceil() as u32).clamp(2, MOST);
         let weight = area / (steps * steps) as f32;
-        let corners = [i, j, k];
         let mut pairs = [0.0; 6];
         for phi in middles(steps) {
             let place = places[0] * phi.x + places[1] * phi.y + places[2] * phi.z;
@@ -256,14 +252,12 @@ pub fn means<'a>(
                 Vec3::from_array([r, g, b].map(|c| table[usize::from(c)]))
             };
             match light {
-                Some(light) => light.get(i as usize).copied().unwrap_or(Vec3::ZERO),
-                None => part.vertices.get(i as usize).map_or(Vec3::ZERO, color),
+                Some(light) => slice::item(light, i as usize),
+                None => color(&slice::item(&part.vertices, i as usize)),
             }
         };
         for corners in part.indices.as_chunks::<3>().0 {
-            let [Some(a), Some(b), Some(c)] = corners.map(|i| part.vertices.get(i as usize)) else {
-                continue;
-            };
+            let [a, b, c] = corners.map(|i| slice::item(&part.vertices, i as usize));
             let area = (b.position - a.position)
                 .cross(c.position - a.position)
                 .length();

@@ -282,7 +282,7 @@ fn is_cut_jpeg(extension: &str, bytes: &[u8]) -> bool {
     if !matches!(extension, "jpg" | "jpeg") {
         return false;
     }
-    // A file that ends early leaves nothing to read, and has no end.
+    // A file that ends early leaves nothing to read, here and below, and has no end.
     let mut rest = bytes.get(2..).unwrap_or_default();
     loop {
         rest = match rest {

@@ -1,6 +1,7 @@
 //! Sizes of textures: powers of two, and mip chains.
 
 use super::Image;
+use support::slice::item;
 
 impl Image {
     /// The picture with both sides a power of two, as the engine uploads it.
@@ -65,8 +66,8 @@ impl Image {
         let texels = self.rgba.as_chunks::<4>().0;
         let mut sum = [0u16; 4];
         for (y, x) in taps {
-            let texel = texels.get(y * self.width as usize + x);
-            for (sum, byte) in sum.iter_mut().zip(texel.copied().unwrap_or_default()) {
+            let texel = item(texels, y * self.width as usize + x);
+            for (sum, byte) in sum.iter_mut().zip(texel) {
                 *sum += u16::from(byte);
             }
         }

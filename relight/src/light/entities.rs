@@ -28,7 +28,7 @@ pub(crate) fn light_entities(entities: &[Entity]) -> (Vec<PointLight>, Vec<SunLi
     let mut suns = Vec::new();
     for entity in entities.iter().filter(|e| is_light(e.classname())) {
         let Some(origin) = entity.vec3("origin") else {
-            continue;
+            continue; // no place
         };
         let value = value_of(entity);
         let color = color(entity);

@@ -79,9 +79,7 @@ fn points_on_surfaces(
         .filter_map(|id| slice::get(&world.surfaces, id.index()))
     {
         for triangle in surface.triangles() {
-            let Some([a, b, c]) = world.triangle(triangle) else {
-                continue;
-            };
+            let [a, b, c] = world.triangle(triangle);
             let bounds = Aabb::of([a, b, c]);
             // only surfaces that may lie in the cluster
             let touches = |leaf: &Aabb| bounds.touches(leaf.grown(Vec3::ONE));
@@ -135,9 +133,7 @@ fn points_in_the_open(
         if points.len() >= wanted || boxes.is_empty() {
             break;
         }
-        let Some(bounds) = boxes.get(attempt % boxes.len()) else {
-            break;
-        };
+        let bounds = slice::item(boxes, attempt % boxes.len());
         let at = Vec3::new(random.uniform(), random.uniform(), random.uniform());
         let position = bounds.mins + bounds.size() * at;
         if inside(position) {
@@ -163,8 +159,8 @@ pub(super) enum Target<'a> {
 impl<'a> Target<'a> {
     pub fn of(world: &'a RelitWorld, entry: u32) -> Option<Self> {
         match world.light_lists.light(entry) {
-            LightRef::Triangle(i) => world.lights.get(i as usize).map(Target::Triangle),
-            LightRef::Point(i) => world.point_lights.get(i as usize).map(Target::Point),
+            LightRef::Triangle(i) => slice::get(&world.lights, i as usize).map(Target::Triangle),
+            LightRef::Point(i) => slice::get(&world.point_lights, i as usize).map(Target::Point),
         }
     }
 

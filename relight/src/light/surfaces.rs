@@ -6,7 +6,7 @@ use super::{
 };
 use crate::world::{NO_LIGHT, RelitWorld, WorldMaterial, WorldSurface};
 use glam::Vec3;
-use support::slice::{self, part};
+use support::slice::{self, part, span};
 
 /// Smallest area of an emitting triangle, square id units: below it the light is less than rounding and the normal
 /// is noise.
@@ -78,7 +78,7 @@ pub(crate) fn add_triangle_lights_of(world: &mut RelitWorld, chosen: impl Fn(u32
         }
         let material = slice::get(&world.materials, surface.material as usize);
         let Some((material, emission)) = material.and_then(|m| Some((m, m.emission?))) else {
-            continue;
+            continue; // emits nothing
         };
         let first = lights.len();
         let degenerate = add_surface_lights(
@@ -141,14 +141,13 @@ pub(crate) fn remove_triangle_lights(world: &mut RelitWorld, dropped: impl Fn(u3
     let old = std::mem::take(&mut world.lights);
     world.triangle_lights.fill(NO_LIGHT);
     for surface in &mut world.surfaces {
-        let first = surface.first_light as usize;
-        let own = old.get(first..first + surface.num_lights as usize);
+        let own = part(&old, span(surface.first_light, surface.num_lights));
         surface.first_light = world.lights.len() as u32;
         surface.num_lights = 0;
         if dropped(surface.material) {
             continue;
         }
-        for light in own.unwrap_or_default() {
+        for light in own {
             if light.radiance.max_element() > 0.0 {
                 if let Some(slot) = world.triangle_lights.get_mut(light.triangle as usize) {
                     *slot = world.lights.len() as u32;
@@ -194,9 +193,7 @@ fn add_surface_lights(
     let first = surface.first_index / 3;
     let mut degenerate = 0;
     for triangle in first..first + surface.num_indices / 3 {
-        let Some([a, b, c]) = world.triangle(triangle as usize) else {
-            continue;
-        };
+        let [a, b, c] = world.triangle(triangle as usize);
         // Front faces of a map are clockwise; a light's are counter-clockwise.
         let corners = if emission.reversed {
             [a, b, c]

@@ -238,7 +238,7 @@ pub(super) fn second_round(
         }
         let more = (wanted as u32).saturating_sub(pair.rays);
         let Some(target) = Target::of(world, pair.entry).filter(|_| more > 0) else {
-            continue;
+            continue; // the first round sent enough
         };
         let seen = trace_pair(
             pair.entry, &target, receivers, occluders, more, random, &mut last,

@@ -14,6 +14,7 @@ use std::sync::Arc;
 use support::Aabb;
 use support::bvh::{Hierarchy, LeafRule};
 use support::simd4::{Four, WIDE, at, cross, dot, four, lanes, splat, sub};
+use support::slice;
 
 /// A leaf tests up to four triangles at once: fewer cost the same.
 const LEAF_RULE: LeafRule = LeafRule {
@@ -223,7 +224,7 @@ impl Occluders {
 
     /// Whether a leaf stops a ray.
     fn blocks(&self, leaf: u32, ray: &Ray, through_sky: bool) -> bool {
-        let Some(leaf) = self.leaves.get(leaf as usize) else {
+        let Some(leaf) = slice::get(&self.leaves, leaf as usize) else {
             return false;
         };
         let hits = leaf.intersect(ray, SHORT);
@@ -268,7 +269,7 @@ impl Occluders {
         let mut next = (!self.nodes.is_empty()).then_some(0);
         while let Some(at) = next {
             if at & LEAF == 0 {
-                let node = self.nodes.get(at as usize)?;
+                let node = slice::get(&self.nodes, at as usize)?;
                 let (mask, _) = node.enters(ray, SHORT);
                 for lane in lanes(mask) {
                     match stack.get_mut(depth) {
@@ -296,7 +297,7 @@ impl Occluders {
         let ray = Ray::new(from, ray);
         let mut nearest: Option<Hit> = None;
         self.walk(&ray, limit, |index, limit| {
-            let Some(leaf) = self.leaves.get(index as usize) else {
+            let Some(leaf) = slice::get(&self.leaves, index as usize) else {
                 return false;
             };
             let hits = leaf.intersect(&ray, limit.next_up());
@@ -328,7 +329,7 @@ impl Occluders {
                 }
                 continue;
             }
-            let Some(node) = self.nodes.get(at as usize) else {
+            let Some(node) = slice::get(&self.nodes, at as usize) else {
                 continue;
             };
             let (mask, near) = node.enters(ray, limit * BEYOND);

@@ -27,11 +27,11 @@ impl Occluders {
             let sky = material.is_some_and(WorldMaterial::is_sky);
             let first = surface.first_index as usize / 3;
             (first..first + surface.num_indices as usize / 3)
-                .filter_map(move |t| Some((world.triangle(t)?, sky, t as u32)))
+                .map(move |t| (world.triangle(t), sky, t as u32))
         }))
         .cut(|tag| {
             let holes = holes_of.get(&tag)?;
-            let [a, b, c] = world.corners(tag as usize)?;
+            let [a, b, c] = world.corners(tag as usize);
             Some(CutOut {
                 st: [a.st, b.st, c.st],
                 holes: Arc::clone(holes),

@@ -120,9 +120,7 @@ impl RelitWorld {
                     sort: shader.map_or(0.0, |s| s.sort_value()),
                     material: surface.material,
                 },
-                triangles: (first..first + count)
-                    .filter_map(|t| self.triangle(t))
-                    .collect(),
+                triangles: (first..first + count).map(|t| self.triangle(t)).collect(),
             }
         };
         stack(&self.surfaces.iter().map(sheet).collect::<Vec<_>>())

@@ -4,13 +4,13 @@ use crate::overbright;
 use glam::{Vec2, Vec3};
 use q3bsp::{Bsp, DrawVert, PatchMesh, Plane, Surface, SurfaceKind};
 use std::ops::Range;
-use support::slice::{part, part_mut, span};
+use support::slice::{item, part, part_mut, span};
 
 /// [`RelitWorld::triangle_lights`](crate::RelitWorld::triangle_lights) of a triangle that emits nothing.
 pub const NO_LIGHT: u32 = u32::MAX;
 
 /// A vertex as it is drawn. No component is NaN or infinite.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct WorldVertex {
     /// Position in model space, id units.
     pub position: Vec3,
@@ -227,11 +227,7 @@ impl Geometry {
 
     /// Twice a triangle's area times its front normal; front faces are clockwise.
     fn triangle_front(&self, corners: &[u32; 3]) -> Vec3 {
-        let [a, b, c] = corners.map(|i| {
-            self.vertices
-                .get(i as usize)
-                .map_or(Vec3::ZERO, |v| v.position)
-        });
+        let [a, b, c] = corners.map(|i| item(&self.vertices, i as usize).position);
         (c - a).cross(b - a)
     }
 

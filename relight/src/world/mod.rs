@@ -24,7 +24,7 @@ use crate::exposure::{self, Exposure};
 use crate::overbright;
 use glam::Vec3;
 use q3bsp::{Bsp, Lightmap};
-use support::slice::{self, part, span};
+use support::slice::{self, item, part, span};
 
 /// A map prepared for tracing and rasterization.
 ///
@@ -141,22 +141,15 @@ impl RelitWorld {
         )
     }
 
-    /// Corners of a triangle of [`indices`](Self::indices), model space; `None` past the end.
-    pub fn triangle(&self, triangle: usize) -> Option<[Vec3; 3]> {
-        let corners = self.indices.as_chunks::<3>().0.get(triangle)?;
-        let position = |&i: &u32| {
-            self.vertices
-                .get(i as usize)
-                .map_or(Vec3::ZERO, |v| v.position)
-        };
-        Some(std::array::from_fn(|k| position(&corners[k])))
+    /// Corners of a triangle of [`indices`](Self::indices), model space.
+    pub fn triangle(&self, triangle: usize) -> [Vec3; 3] {
+        self.corners(triangle).map(|v| v.position)
     }
 
-    /// Vertices of a triangle of [`indices`](Self::indices); `None` past the end.
-    pub(crate) fn corners(&self, triangle: usize) -> Option<[&WorldVertex; 3]> {
-        let [a, b, c] = *self.indices.as_chunks::<3>().0.get(triangle)?;
-        let vertex = |i: u32| self.vertices.get(i as usize);
-        Some([vertex(a)?, vertex(b)?, vertex(c)?])
+    /// Vertices of a triangle of [`indices`](Self::indices).
+    pub(crate) fn corners(&self, triangle: usize) -> [WorldVertex; 3] {
+        let corners: [u32; 3] = item(self.indices.as_chunks().0, triangle);
+        corners.map(|i| item(&self.vertices, i as usize))
     }
 
     /// Change of a light over time; `None` if it is constant.

@@ -5,7 +5,7 @@ use relight::materials::light::{self, LightLinear};
 use shaders::types::{self, constants as c};
 use shaderscript::Shader;
 use shaderscript::surface_params::CONTENTS_SLIME;
-use support::slice::{part, span};
+use support::slice::{self, part, span};
 
 use super::compile::StageArrays;
 use super::flags::has_vertex_light;
@@ -23,7 +23,7 @@ fn mean_layer(
 ) -> LightLinear {
     let mut samples = light::stage_samples_white(&shader.stages);
     for (i, sample) in samples.iter_mut().enumerate() {
-        let Some(stage) = arrays.stages.get(stage_first + i) else {
+        let Some(stage) = slice::get(&arrays.stages, stage_first + i) else {
             continue;
         };
         if stage.flags & c::STAGE_REFLECTION != 0 {

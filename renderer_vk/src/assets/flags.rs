@@ -3,6 +3,7 @@
 use relight::materials::light::{self, BakedLight, SurfaceClass};
 use shaders::types::constants as c;
 use shaderscript::{Deform, RgbGen, Shader, Stage, StageImage};
+use support::slice;
 
 use super::material::LightmapClass;
 
@@ -27,7 +28,7 @@ pub(super) fn stage_flags(
     number: usize,
     baked: Option<BakedLight>,
 ) -> u32 {
-    let Some(stage) = shader.stages.get(number) else {
+    let Some(stage) = slice::get(&shader.stages, number) else {
         return 0;
     };
     let mut flags = baked_light_flag(baked, stage);

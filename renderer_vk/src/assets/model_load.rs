@@ -55,7 +55,7 @@ impl Loader<'_> {
         for (format, extension) in others {
             let other = format!("{stem}.{extension}");
             let Some(model) = self.by_format(*format, &other) else {
-                continue;
+                continue; // absent, or refused with a warning
             };
             if known.is_some() {
                 log::info!("{name}: not usable; {other} is used");

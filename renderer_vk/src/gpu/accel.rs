@@ -296,12 +296,9 @@ fn plan(builds: &mut [BlasBuild<'_>]) -> Result<Vec<Planned>, Error> {
                 size,
             )?);
         }
-        let target = build
-            .blas
-            .storage
-            .as_ref()
-            .map(|s| s.raw)
-            .unwrap_or_default();
+        // Made above where it was missing.
+        let target = build.blas.storage.as_ref().map(|s| s.raw);
+        let target = target.unwrap_or_default();
         build.blas.built.clone_from(&counts);
         planned.push(Planned {
             geometries,
@@ -438,6 +435,7 @@ impl Device {
                     .ask_compacted_sizes(&wanted)
             })?
         };
+        // `immediate` has waited for them.
         let sizes = asked.sizes()?.unwrap_or_default();
         self.immediate(|rec| {
             let mut pass = rec.pass("compact_blas", Access::ACCEL_BUILD, Access::ACCEL_BUILD)?;

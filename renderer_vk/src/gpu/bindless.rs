@@ -154,11 +154,9 @@ impl Bindless {
             .descriptor_pool(self.pool)
             .set_layouts(&layouts);
         // SAFETY: the pool has room for this one set.
-        self.set = unsafe { raw.allocate_descriptor_sets(&set_info) }
-            .context("vkAllocateDescriptorSets")?
-            .first()
-            .copied()
-            .unwrap_or_default();
+        let sets = unsafe { raw.allocate_descriptor_sets(&set_info) };
+        // One set for the one layout.
+        self.set = sets.context("vkAllocateDescriptorSets")?[0];
         let ranges = [vk::PushConstantRange {
             stage_flags: vk::ShaderStageFlags::ALL,
             offset: 0,

@@ -374,8 +374,10 @@ impl DeviceInner {
 
     /// Sets an object's name for validation messages and captures.
     pub fn name<T: vk::Handle>(&self, handle: T, name: &str) {
+        // Without the extension names are of no use.
         let Some(debug) = &self.debug else { return };
         let Ok(name) = std::ffi::CString::new(name) else {
+            debug_assert!(false, "{name:?} contains a NUL");
             return;
         };
         let info = vk::DebugUtilsObjectNameInfoEXT::default()

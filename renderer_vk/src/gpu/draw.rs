@@ -85,8 +85,8 @@ impl Pass<'_> {
             (target.color, ImageUsage::COLOR),
             (target.depth, ImageUsage::DEPTH),
         ];
-        for (image, usage) in attachments {
-            let Some(image) = image else { continue };
+        let attachments = attachments.iter();
+        for (image, usage) in attachments.filter_map(|&(image, usage)| Some((image?, usage))) {
             if !image.usage().has(usage) {
                 return Err(image.misuse("is not made to be drawn to in this way"));
             }
@@ -100,6 +100,7 @@ impl Pass<'_> {
             clears[count] = if usage == ImageUsage::COLOR {
                 vk::ClearValue {
                     color: vk::ClearColorValue {
+                        // Not read where the attachment is loaded.
                         float32: target.clear_color.unwrap_or_default(),
                     },
                 }

@@ -91,6 +91,7 @@ impl Instance {
         let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
         let mut features =
             vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
+        // No NUL is left.
         let app_name = CString::new(app_name.replace('\0', "")).unwrap_or_default();
         let app = vk::ApplicationInfo::default()
             .application_name(&app_name)
@@ -210,6 +211,7 @@ fn has_validation_layer(entry: &ash::Entry) -> Result<bool, Error> {
 fn validates_synchronization(entry: &ash::Entry) -> bool {
     // SAFETY: no instance is needed; the layer was found.
     let of_layer = unsafe { entry.enumerate_instance_extension_properties(Some(VALIDATION_LAYER)) };
+    // A layer that does not say what it supports counts as without.
     has(
         &of_layer.unwrap_or_default(),
         ext::validation_features::NAME,

@@ -74,7 +74,7 @@ pub struct MemoryReport {
 }
 
 impl Device {
-    /// Memory in use.
+    /// Memory in use; none while the device is taken down.
     pub fn memory_report(&self) -> MemoryReport {
         lock(&self.0.allocator)
             .as_ref()
@@ -89,7 +89,7 @@ impl Device {
             .unwrap_or_default()
     }
 
-    /// All allocations in use.
+    /// All allocations in use; none while the device is taken down.
     pub fn memory_uses(&self) -> Vec<MemoryUse> {
         let allocator = lock(&self.0.allocator);
         let allocations = allocator.as_ref().map(|a| a.generate_report().allocations);

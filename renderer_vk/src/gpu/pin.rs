@@ -20,7 +20,7 @@ pub(crate) fn pin_drivers(function: vk::PFN_vkQueueSubmit) {
     const ENTRY_POINT: &[u8] = b"vk_icdGetInstanceProcAddr\0";
 
     let Ok(maps) = std::fs::read("/proc/self/maps") else {
-        return;
+        return; // no `/proc`
     };
     let own = mapped_file(&maps, function as usize as u64);
     let files: BTreeSet<&[u8]> = mappings(&maps).map(|(_, _, file)| file).collect();

@@ -75,6 +75,7 @@ impl<'a> GraphicsDesc<'a> {
     }
 
     fn rasterization(&self) -> vk::PipelineRasterizationStateCreateInfo<'static> {
+        // Without an offset both are 0 and the bias is off.
         let (slope, units) = self.polygon_offset.unwrap_or_default();
         vk::PipelineRasterizationStateCreateInfo::default()
             .polygon_mode(if self.wireframe {

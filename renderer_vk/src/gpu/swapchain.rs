@@ -1,6 +1,7 @@
 //! The swapchain of the window.
 
 use ash::vk;
+use support::slice;
 
 use super::device::{Device, lock};
 use super::error::{Context, Error};
@@ -187,7 +188,7 @@ impl Swapchain {
             match got {
                 Ok((index, suboptimal)) => {
                     self.stale = suboptimal;
-                    let Some((image, finished)) = self.images.get(index as usize) else {
+                    let Some((image, finished)) = slice::get(&self.images, index as usize) else {
                         return Ok(None);
                     };
                     self.acquired = Some(available);
@@ -242,10 +243,8 @@ impl Swapchain {
     /// # Errors
     /// Out of memory, a lost surface, device loss.
     pub fn show(&mut self) -> Result<(), Error> {
-        let Some(image) = self.put_off.take() else {
-            return Ok(());
-        };
-        let Some(functions) = &self.device.0.swapchain else {
+        // Without the extension no image was acquired.
+        let (Some(image), Some(functions)) = (self.put_off.take(), &self.device.0.swapchain) else {
             return Ok(());
         };
         let (waits, swapchains, indices) = ([image.finished], [self.raw], [image.index]);

@@ -193,6 +193,7 @@ impl Pass<'_> {
         let align = scratch_alignment(&device);
         let scratch = self.recorder().scratch(sizes.build_scratch_size + align)?;
         self.barrier();
+        // `reserve` has made the storage.
         info = info
             .dst_acceleration_structure(tlas.storage.as_ref().map(|s| s.raw).unwrap_or_default())
             .scratch_data(vk::DeviceOrHostAddressKHR {

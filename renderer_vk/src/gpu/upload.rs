@@ -193,7 +193,7 @@ fn full_barrier(
             *place = image;
             count += 1;
         }
-        let part = piece.get(..count).unwrap_or_default();
+        let part = &piece[..count];
         let flags = vk::DependencyFlags::empty();
         // SAFETY: `cmd` is being recorded outside of a render pass; the images are alive (graveyard).
         unsafe {

@@ -7,7 +7,7 @@ use support::slice::{self, part};
 
 use super::list::{DepthRange, DrawList};
 use super::overlay::{Overlay, Picture2d};
-use super::pipelines::{CullFaces, Depth, State};
+use super::pipelines::{CullFaces, State};
 use super::shading::Shading;
 use crate::scene::DebugPolygons;
 
@@ -149,13 +149,8 @@ impl DrawList {
 
 fn outlines(cull: CullFaces) -> State {
     State {
-        blend: None,
-        depth: Depth::LessEqual,
-        depth_write: true,
-        cull,
-        offset: false,
         wireframe: true,
-        shading: Shading::WHITE,
+        ..State::plain(cull)
     }
 }
 

@@ -43,9 +43,6 @@ pub fn pipeline(
     GraphicsPipeline::new(
         device,
         &GraphicsDesc {
-            color: Some(target.color),
-            depth: Some(target.depth),
-            samples: target.samples,
             stencil: shade.then_some(Stencil::NotZero),
             depth_test: if shade {
                 DepthTest::LessEqual
@@ -59,7 +56,7 @@ pub fn pipeline(
                 _ => target.mask,
             },
             fragment: (kind != Kind::Depth).then_some(&shaders::RASTER_COVER_FRAG),
-            ..GraphicsDesc::new(
+            ..target.desc(
                 "cover",
                 &shaders::RASTER_COVER_VERT,
                 &shaders::RASTER_COVER_FRAG,

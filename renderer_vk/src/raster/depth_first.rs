@@ -8,10 +8,10 @@
 use shaders::types::Draw;
 use shaders::types::constants as c;
 use shaderscript::sort;
-use support::slice::{part, span};
+use support::slice::{self, part, span};
 
 use super::list::{Call, DepthRange, DrawList};
-use super::pipelines::{CullFaces, Depth, State};
+use super::pipelines::{CullFaces, State};
 use super::shading::Shading;
 use crate::assets::Material;
 use crate::scene::{DrawSurface, Geometry};
@@ -48,16 +48,11 @@ pub(super) fn order_free(material: &Material) -> bool {
 /// State of a draw of depth only.
 pub(super) fn depth_alone(cull: CullFaces) -> State {
     State {
-        blend: None,
-        depth: Depth::LessEqual,
-        depth_write: true,
-        cull,
-        offset: false,
-        wireframe: false,
         shading: Shading {
             mode: c::DRAW_DEPTH,
             ..Shading::WHITE
         },
+        ..State::plain(cull)
     }
 }
 
@@ -108,7 +103,9 @@ impl DrawList {
         self.occluders
             .sort_unstable_by_key(|o| (alike(o), o.distance_squared.to_bits(), o.first_index));
         for run in self.occluders.chunk_by(|a, b| alike(a) == alike(b)) {
-            let Some(&first) = run.first() else { continue };
+            let Some(&first) = slice::get(run, 0) else {
+                continue;
+            };
             let first_index = self.indices.len() as u32;
             for occluder in run {
                 let own = part(indices, span(occluder.first_index, occluder.index_count));

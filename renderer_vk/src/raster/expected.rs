@@ -88,10 +88,9 @@ fn surfaces(
             blend: first.blend,
             depth: stage_depth(first),
             depth_write: first.depth_write,
-            cull: faces(material.shader.cull, false),
             offset: material.polygon_offset,
-            wireframe: false,
             shading,
+            ..State::plain(faces(material.shader.cull, false))
         };
         Some((state, draw))
     };
@@ -151,10 +150,8 @@ fn lights(stages: &StageContext<'_>, mut found: impl FnMut(State, Draw)) {
             blend: Some((source, c::BLEND_ONE)),
             depth: Depth::Equal,
             depth_write: false,
-            cull: CullFaces::CounterClockwise,
-            offset: false,
-            wireframe: false,
             shading,
+            ..State::plain(CullFaces::CounterClockwise)
         };
         found(state, draw);
     }

@@ -12,7 +12,7 @@ use shaders::types::{Flare, FlareState, Vertex};
 
 use super::target::{Target, TargetKind};
 use crate::gpu::{
-    self, Access, Buffer, BufferDesc, BufferUsage, ColorMask, ComputePipeline, DepthTest, Device,
+    self, Access, Buffer, BufferDesc, BufferUsage, ColorMask, ComputePipeline, Device,
     GraphicsDesc, GraphicsPipeline, Memory, Recorder, Rendering, Topology,
 };
 use crate::scene::{ClassicScene, DrawSurface, Geometry, ViewScene};
@@ -294,14 +294,10 @@ fn test_pipeline(device: &Device, target: TargetKind) -> Result<GraphicsPipeline
     GraphicsPipeline::new(
         device,
         &GraphicsDesc {
-            color: Some(target.color),
-            depth: Some(target.depth),
-            samples: target.samples,
-            depth_test: DepthTest::LessEqual,
             depth_write: false,
             color_write: ColorMask::NONE,
             topology: Topology::Points,
-            ..GraphicsDesc::new(
+            ..target.desc(
                 "flare test",
                 &shaders::RASTER_FLARE_TEST_VERT,
                 &shaders::RASTER_FLARE_TEST_FRAG,

@@ -95,13 +95,8 @@ impl GroupContext<'_> {
 
     fn plain_state(&self, material: &Material) -> State {
         State {
-            blend: None,
-            depth: Depth::LessEqual,
-            depth_write: true,
-            cull: faces(material.shader.cull, self.scene.view.mirrored),
             offset: material.polygon_offset,
-            wireframe: false,
-            shading: Shading::WHITE,
+            ..State::plain(faces(material.shader.cull, self.scene.view.mirrored))
         }
     }
 }
@@ -279,7 +274,7 @@ impl DrawList {
         context: &GroupContext<'_>,
     ) {
         let (stages, aids) = (context.stages, context.aids);
-        let (Some(instance), Some(pass)) = (context.instance(group), passes.first()) else {
+        let (Some(instance), Some(pass)) = (context.instance(group), slice::get(passes, 0)) else {
             return;
         };
         let draw = plain_draw(group);
@@ -352,7 +347,7 @@ impl DrawList {
 
     fn add_fog(&mut self, material: &Material, group: &Group, context: &GroupContext<'_>) {
         let Some(opaque) = fogged(material, group.common.fog) else {
-            return;
+            return; // no fog over it
         };
         let (shading, draw) = context.stages.fog(plain_draw(group));
         let state = fog_state(context.plain_state(material), opaque, shading);

@@ -58,13 +58,7 @@ impl LightReach {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn vertex(x: f32, y: f32, z: f32) -> Vertex {
-        Vertex {
-            position: Vec3::new(x, y, z),
-            ..Vertex::default()
-        }
-    }
+    use crate::test_support::vertex;
 
     #[test]
     fn triangles_wholly_beyond_one_side_are_left_out() {

@@ -15,6 +15,7 @@ use crate::assets::compile::sampler;
 use crate::assets::{Material, Materials, RasterPass};
 use crate::scene::{ClassicScene, SKY_FACES, Sun, VisibleSky};
 use shaderscript::{Cull, sort};
+use support::slice;
 
 /// The depth range of a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -169,7 +170,8 @@ impl DrawList {
         aids: Aids,
     ) {
         let material = stages.materials.get(visible.material);
-        let (Some(sky), Some(world)) = (&material.sky, scene.instances.first()) else {
+        // The material may be remapped to one that is no sky.
+        let (Some(sky), Some(world)) = (&material.sky, slice::get(&scene.instances, 0)) else {
             return;
         };
         if aids.leaves_out(material.sort) {
@@ -185,7 +187,7 @@ impl DrawList {
         if let Some(images) = &sky.faces {
             for (face, &image) in images.iter().enumerate() {
                 let Some(cells) = visible.coverage.cells(face) else {
-                    continue;
+                    continue; // hidden
                 };
                 let span = self
                     .mesh()
@@ -211,11 +213,10 @@ impl DrawList {
             // the box has no fog
             let fog = visible.fog;
             let draw = Draw { fog, ..draw };
-            let cull = CullFaces::None;
             let part = SkyPart {
                 material,
                 world,
-                cull,
+                cull: CullFaces::None,
                 span,
                 draw,
             };
@@ -239,7 +240,7 @@ impl DrawList {
     /// Adds the sun's disc, in front of the sky and behind everything else.
     fn add_sun(&mut self, sun: &Sun, scene: &ClassicScene, stages: StageContext<'_>, aids: Aids) {
         let material = stages.materials.get(sun.material);
-        let Some(world) = scene.instances.first() else {
+        let Some(world) = slice::get(&scene.instances, 0) else {
             return;
         };
         let span = self.mesh().append_sun(sun.direction, &scene.view);
@@ -259,25 +260,21 @@ impl DrawList {
     }
 
     fn add_sky_passes(&mut self, part: SkyPart<'_>, stages: StageContext<'_>, aids: Aids) {
-        let SkyPart {
-            material,
-            world,
-            cull,
-            span,
-            draw,
-        } = part;
-        for passes in passes::draws(&material.passes, aids.passes_alone()) {
-            let Some(pass) = passes.first() else { continue };
+        for passes in passes::draws(&part.material.passes, aids.passes_alone()) {
+            let Some(pass) = slice::get(passes, 0) else {
+                continue;
+            };
+            let fog_adjust = fog_adjust(part.material, part.draw.fog, pass.blend);
             let (shading, draw) = stages.passes(
-                material,
+                part.material,
                 passes,
-                world,
+                part.world,
                 c::NO_TEXTURE,
-                fog_adjust(material, draw.fog, pass.blend),
-                draw,
+                fog_adjust,
+                part.draw,
             );
-            let state = sky_state(pass.blend, pass.depth_write, cull, shading);
-            self.push(state, aids.sky_range(), span, draw);
+            let state = sky_state(pass.blend, pass.depth_write, part.cull, shading);
+            self.push(state, aids.sky_range(), part.span, draw);
         }
     }
 
@@ -298,12 +295,9 @@ pub(super) fn sky_state(
 ) -> State {
     State {
         blend,
-        depth: Depth::LessEqual,
         depth_write,
-        cull,
-        offset: false,
-        wireframe: false,
         shading,
+        ..State::plain(cull)
     }
 }
 

@@ -29,6 +29,21 @@ pub struct State {
     pub shading: Shading,
 }
 
+impl State {
+    /// White over what is not nearer, with its depth.
+    pub const fn plain(cull: CullFaces) -> State {
+        State {
+            blend: None,
+            depth: Depth::LessEqual,
+            depth_write: true,
+            cull,
+            offset: false,
+            wireframe: false,
+            shading: Shading::WHITE,
+        }
+    }
+}
+
 /// Depth comparison of a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Depth {
@@ -134,9 +149,6 @@ impl Pipelines {
         let pipeline = GraphicsPipeline::new(
             &self.device,
             &GraphicsDesc {
-                color: Some(target.color),
-                depth: Some(target.depth),
-                samples: target.samples,
                 color_write: if depth_alone {
                     ColorMask::NONE
                 } else {
@@ -159,7 +171,7 @@ impl Pipelines {
                 wireframe: state.wireframe && self.device.info().wireframe,
                 constants: &state.shading.constants(),
                 fragment: (!depth_alone).then_some(fragment),
-                ..GraphicsDesc::new("raster", vertex, fragment)
+                ..target.desc("raster", vertex, fragment)
             },
         )?;
         self.made.insert((target, state), pipeline);
@@ -168,6 +180,8 @@ impl Pipelines {
 
     /// The pipeline of a prepared state.
     pub fn get(&self, target: TargetKind, state: State) -> Option<&GraphicsPipeline> {
-        self.made.get(&(target, state))
+        let made = self.made.get(&(target, state));
+        debug_assert!(made.is_some(), "no pipeline for {state:?}");
+        made
     }
 }

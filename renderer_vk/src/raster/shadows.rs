@@ -44,14 +44,11 @@ impl Made {
             GraphicsPipeline::new(
                 device,
                 &GraphicsDesc {
-                    color: Some(target.color),
-                    depth: Some(target.depth),
-                    samples: target.samples,
                     stencil: Some(stencil),
                     depth_write: false,
                     color_write: ColorMask::NONE,
                     cull,
-                    ..GraphicsDesc::new(
+                    ..target.desc(
                         "shadow volumes",
                         &shaders::RASTER_SHADOW_VERT,
                         &shaders::RASTER_SHADOW_FRAG,
@@ -116,6 +113,7 @@ impl Shadows {
         view: &View,
     ) {
         let Some(made) = self.made.get(&target) else {
+            debug_assert!(false, "volumes are drawn that were not uploaded");
             return;
         };
         let [x, y, width, height] = view.viewport.map(|v| v as f32);

@@ -1,6 +1,7 @@
 //! Targets of the classic look.
 
-use crate::gpu::{ColorMask, Format, Image};
+use crate::gpu::{ColorMask, Format, GraphicsDesc, Image};
+use shaders::Spirv;
 
 /// Target images of a view.
 #[derive(Clone, Copy)]
@@ -26,6 +27,23 @@ pub struct TargetKind {
     pub mask: ColorMask,
     /// Counts fragments (`r_measureOverdraw`).
     pub counted: bool,
+}
+
+impl TargetKind {
+    /// A pipeline that draws to it: [`GraphicsDesc::new`].
+    pub fn desc<'a>(
+        self,
+        name: &'a str,
+        vertex: &'a Spirv,
+        fragment: &'a Spirv,
+    ) -> GraphicsDesc<'a> {
+        GraphicsDesc {
+            color: Some(self.color),
+            depth: Some(self.depth),
+            samples: self.samples,
+            ..GraphicsDesc::new(name, vertex, fragment)
+        }
+    }
 }
 
 impl Target<'_> {

@@ -49,7 +49,7 @@ impl KeptPipelines {
     /// Writes the file if the device has compiled pipelines since.
     pub fn write(&mut self, device: &Device) {
         let Some(path) = self.path.as_ref().filter(|_| !self.failed) else {
-            return;
+            return; // nothing is kept, or a warning was given
         };
         let result = device
             .pipeline_cache_data()

@@ -21,7 +21,9 @@ impl Renderer {
 
     /// Draws a material in a rectangle of window pixels.
     pub fn stretch_pic(&mut self, picture: &StretchedPicture, shader: i32) {
-        let Some(assets) = &self.assets else { return };
+        let Some(assets) = &self.assets else {
+            return; // between registrations
+        };
         let material = assets.materials.resolve(assets.material_of_handle(shader));
         self.overlay.add(
             material,

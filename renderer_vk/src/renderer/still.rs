@@ -111,7 +111,7 @@ impl Renderer {
         let (Some(still), Some(look), Some(assets)) =
             (&mut request.still, &self.trace, &self.assets)
         else {
-            return;
+            return; // no picture is wanted
         };
         let now = Instant::now();
         if let Some(last) = request.last.replace(now) {

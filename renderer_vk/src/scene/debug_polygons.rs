@@ -22,11 +22,13 @@ impl DebugPolygons {
     /// Adds a convex polygon if it faces `camera`: its front winds clockwise. The lowest three bits of `color` are red,
     /// green and blue.
     pub fn add(&mut self, color: u32, corners: &[Vec3], camera: Vec3) {
-        let [a, b, c, ..] = *corners else { return };
+        let [a, b, c, ..] = *corners else {
+            return; // no area
+        };
         let normal = (c - a).cross(b - a);
         let finite = corners.iter().all(|corner| corner.is_finite());
         let Some(size) = u32::try_from(corners.len()).ok().filter(|_| finite) else {
-            return;
+            return; // a corner is not finite
         };
         if normal.dot(camera - a) <= 0.0 {
             return;

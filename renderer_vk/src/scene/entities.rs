@@ -67,7 +67,7 @@ impl Gatherer<'_> {
         let ways = self.ways_of(entity, turns);
         for way in 0..ways {
             let Some(Way { paths, view }) = self.way(way, ways) else {
-                continue;
+                continue; // nothing is seen on it
             };
             let mut raw = RawMesh::begin(out, material, instance, fog);
             raw.paths = paths;
@@ -104,7 +104,7 @@ impl Gatherer<'_> {
                 let ways = self.ways_of(entity, true);
                 for way in 0..ways {
                     let Some(Way { paths, view }) = self.way(way, ways) else {
-                        continue;
+                        continue; // nothing is seen on it
                     };
                     let mut raw = RawMesh::begin(out, axes, instance, 0);
                     raw.paths = paths;
@@ -159,7 +159,7 @@ impl Gatherer<'_> {
         out: &mut ViewScene,
     ) {
         let Some(world) = self.input.world else {
-            return;
+            return; // the game names a model of a map that is not loaded
         };
         let Some(brush) = world.models.get(model as usize).copied() else {
             // the map has no such model

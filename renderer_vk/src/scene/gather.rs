@@ -413,7 +413,7 @@ impl<'a> Gatherer<'a> {
             let ways = if turns { self.turned.len() + 1 } else { 1 };
             for way in 0..ways {
                 let Some(Way { paths, .. }) = self.way(way, ways) else {
-                    continue;
+                    continue; // nothing is seen on it
                 };
                 let mut raw = RawMesh::begin(out, deform.material, instance, surface.fog);
                 raw.paths = paths;

@@ -379,11 +379,9 @@ impl Scene {
         self.entities.push(*entity);
     }
 
-    /// Adds polygons of `vertices_per_poly` corners each. Refuses handle 0 with a warning.
+    /// Adds polygons of `vertices_per_poly` corners each. Refuses handles below 1 with a warning.
     pub fn add_poly(&mut self, shader: i32, vertices: &[PolyVert], vertices_per_poly: usize) {
-        let Ok(material) = u32::try_from(shader) else {
-            return;
-        };
+        let material = u32::try_from(shader).unwrap_or(0);
         if material == 0 {
             log::warn!("a polygon without material is left out");
             return;

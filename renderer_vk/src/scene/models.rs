@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use q3model::{BoneMatrix, Frame, Iqm, IqmSurface, MdrSurface};
 use shaders::types::Vertex;
-use support::Aabb;
+use support::{Aabb, slice};
 
 use super::cull;
 use super::gather::{Gatherer, count};
@@ -108,14 +108,14 @@ impl Gatherer<'_> {
     }
 
     fn add_md3(&mut self, placed: Placed<'_>, lods: &[Arc<Md3Lod>], out: &mut ViewScene) {
-        let Some(finest) = lods.first() else {
+        let Some(finest) = slice::get(lods, 0) else {
             return;
         };
         let frames = Frames::of(placed.entity, finest.md3.frames.len());
         let Some(level) = self.level(&placed, &finest.md3.frames, frames, lods.len()) else {
             return;
         };
-        let Some(lod) = lods.get(level) else {
+        let Some(lod) = slice::get(lods, level) else {
             return;
         };
         // coarser levels may have fewer frames
@@ -125,7 +125,7 @@ impl Gatherer<'_> {
             Frames::of(&RefEntity::default(), 1)
         };
         let Some(frame) = self.frame_in_sight(&placed, &lod.md3.frames, frames) else {
-            return;
+            return; // out of sight
         };
         let placed = self.place(placed, frame.local_origin, frame.radius, out);
         let still = (frames.backlerp == 0.0).then_some(StillFrame {
@@ -148,12 +148,14 @@ impl Gatherer<'_> {
         let Some(level) = self.level(&placed, &mdr.frames, frames, mdr.lods.len()) else {
             return;
         };
-        let (Some(surfaces), Some(materials)) = (mdr.lods.get(level), model.materials.get(level))
-        else {
+        let (Some(surfaces), Some(materials)) = (
+            slice::get(&mdr.lods, level),
+            slice::get(&model.materials, level),
+        ) else {
             return;
         };
         let Some(frame) = self.frame_in_sight(&placed, &mdr.frames, frames) else {
-            return;
+            return; // out of sight
         };
         let placed = self.place(placed, frame.local_origin, frame.radius, out);
         let mut bones = std::mem::take(&mut self.scratch.bones);
@@ -209,7 +211,7 @@ impl Gatherer<'_> {
         frames: Frames,
         levels: usize,
     ) -> Option<usize> {
-        let (frame, at) = (finest.get(frames.new)?, placed.entity.origin);
+        let (frame, at) = (slice::get(finest, frames.new)?, placed.entity.origin);
         let settings = self.input.settings;
         Some(key_frames::level_of_detail(
             levels, frame, at, &self.view, settings,
@@ -223,8 +225,8 @@ impl Gatherer<'_> {
         list: &'m [Frame],
         frames: Frames,
     ) -> Option<&'m Frame> {
-        let new = list.get(frames.new)?;
-        let old = list.get(frames.old).unwrap_or(new);
+        let new = slice::get(list, frames.new)?;
+        let old = slice::get(list, frames.old)?;
         let lies = cull::model(placed.entity, new, old, self.planes());
         (!lies.is_outside()).then_some(new)
     }
@@ -277,7 +279,7 @@ impl Gatherer<'_> {
             let ways = self.ways_of(placed.entity, turns);
             for way in 0..ways {
                 let Some(Way { paths, .. }) = self.way(way, ways) else {
-                    continue;
+                    continue; // nothing is seen on it
                 };
                 if way > 0 {
                     let shape = raw.shape;

@@ -66,7 +66,7 @@ pub(super) fn find_all(
             continue;
         };
         let Some(instance) = placed_model(surface.model, entities, input) else {
-            continue;
+            continue; // of a model that the game does not show
         };
         let plane = surface.plane.map(|plane| placed_plane(plane, &instance));
         let plane = plane.or_else(|| {
@@ -76,7 +76,7 @@ pub(super) fn find_all(
             plane_of(&triangle.map(|p| entity::to_world(&instance, p)))
         });
         let Some(portal) = plane.and_then(|plane| portal_at(plane, entities, def)) else {
-            continue;
+            continue; // without an entity that says where it leads
         };
         let known = found.iter().any(|p| {
             p.plane.abs_diff_eq(portal.plane, 1e-3) && p.entity_origin == portal.entity_origin

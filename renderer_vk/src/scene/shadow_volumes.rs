@@ -47,6 +47,7 @@ impl ShadowVolumes {
         let light = instance.light_direction;
         let start = self.indices.len();
         let at = |index: u32| {
+            // A caller may add an index that is none; its triangle casts no shadow.
             let vertex = vertices.get(index.wrapping_sub(base) as usize);
             vertex.map(|vertex| vertex.position)
         };
@@ -70,7 +71,7 @@ impl ShadowVolumes {
                 continue;
             };
             let Ok(first) = u32::try_from(self.positions.len()) else {
-                return;
+                return; // indices have 32 bits
             };
             let away = light * REACH;
             self.positions
@@ -94,13 +95,7 @@ impl ShadowVolumes {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn vertex(x: f32, y: f32, z: f32) -> Vertex {
-        Vertex {
-            position: Vec3::new(x, y, z),
-            ..Vertex::default()
-        }
-    }
+    use crate::test_support::vertex;
 
     /// A unit cube: bits 0 to 2 of a corner's number are its coordinates; faces wind clockwise seen from outside.
     fn cube() -> (Vec<Vertex>, Vec<u32>) {
@@ -110,19 +105,8 @@ mod tests {
                 vertex(bit(0), bit(1), bit(2))
             })
             .collect();
-        let faces = [
-            [0, 1, 3, 2],
-            [4, 6, 7, 5],
-            [0, 4, 5, 1],
-            [2, 3, 7, 6],
-            [0, 2, 6, 4],
-            [1, 5, 7, 3],
-        ];
-        let indices = faces
-            .iter()
-            .flat_map(|&[a, b, c, d]| [10 + a, 10 + b, 10 + c, 10 + a, 10 + c, 10 + d])
-            .collect();
-        (vertices, indices)
+        let triangles = testkit::cube_triangles();
+        (vertices, triangles.flatten().map(|i| 10 + i).collect())
     }
 
     fn lit_from(light: Vec3) -> Instance {

@@ -85,7 +85,7 @@ impl MeshBuilder<'_> {
     pub fn beam(&mut self, entity: &RefEntity) {
         let along = entity.old_origin - entity.origin;
         let Some(direction) = along.try_normalize() else {
-            return;
+            return; // no length
         };
         let spoke = perpendicular(direction) * BEAM_RADIUS;
         let base = self.next();

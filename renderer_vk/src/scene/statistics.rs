@@ -232,7 +232,7 @@ impl Gatherer<'_> {
         for entity in self.entities {
             let model = self.input.models.get(entity.model);
             let Some(model) = model.filter(|_| entity.kind == crate::api::EntityKind::Model) else {
-                continue;
+                continue; // not a model
             };
             if entity.renderfx & renderfx::FIRST_PERSON != 0 && self.view.is_portal {
                 continue;

@@ -121,7 +121,7 @@ pub(super) struct SurfaceRun<'a> {
     pub camera: Vec3,
     /// Index of the instance.
     pub instance: u32,
-    /// The instance.
+    /// The instance; its index is asserted.
     pub placed: Option<&'a Instance>,
     /// The engine's entity number.
     pub entity: u32,

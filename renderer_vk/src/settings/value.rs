@@ -45,7 +45,7 @@ pub(super) trait Value: Copy + Default {
     /// Distinct for distinct values.
     fn bits(self) -> u32;
 
-    /// The value of a row's default.
+    /// The value of a row's default, which a test reads.
     fn default_of(text: &str) -> Self {
         Self::of(&Given::parse(text)).unwrap_or_default()
     }

@@ -119,7 +119,7 @@ impl<'a> Placements<'a> {
     fn add_map(&mut self, view: &TracedScene, geometry: &'a StaticGeometry) {
         let submodels = view.look.submodels.iter().map(|s| (s.model, s.instance));
         for (model, index) in iter::once((0, 0)).chain(submodels) {
-            let Some(instance) = view.instances.get(index as usize) else {
+            let Some(instance) = slice::get(&view.instances, index as usize) else {
                 continue;
             };
             let axis = axes(instance);
@@ -128,7 +128,7 @@ impl<'a> Placements<'a> {
                 continue;
             }
             for blas in geometry.structures.iter().filter(|s| s.model == model) {
-                let Some(first) = blas.parts.first() else {
+                let Some(first) = slice::get(&blas.parts, 0) else {
                     continue;
                 };
                 let record = |part: &StaticPart| GeometryRecord {
@@ -412,7 +412,7 @@ impl Accel {
                 Part::Static(Structure::Driver(_)) => None,
             };
             let Some(own) = found else {
-                continue;
+                continue; // without a triangle
             };
             let inverse = p.axis.inverse();
             boxes.push(Aabb::of(

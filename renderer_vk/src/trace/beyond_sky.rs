@@ -52,7 +52,7 @@ impl MapSkies {
         for surface in &scene.surfaces {
             let (_, info) = materials.info(surface.material);
             let Some(kind) = Kind::of(info.flags) else {
-                continue;
+                continue; // not traced
             };
             if kind == Kind::Sky {
                 made.sky_numbers = made.sky_numbers.max(surface.number as usize + 1);
@@ -60,7 +60,7 @@ impl MapSkies {
                 for corners in corners.chunks_exact(3) {
                     let [a, b, c] = [corners[0], corners[1], corners[2]];
                     let Some(normal) = (c - a).cross(b - a).try_normalize() else {
-                        continue;
+                        continue; // no area
                     };
                     // planes of one brush differ by rounding
                     #[allow(clippy::cast_possible_truncation)]
@@ -177,7 +177,7 @@ impl Beyond {
         }
         for &number in &view.look.potential {
             let Some(Some(bounds)) = map.surfaces.get(number as usize) else {
-                continue;
+                continue; // not traced
             };
             if is_hidden(bounds) {
                 let word = number as usize / 32;

@@ -97,7 +97,7 @@ impl Fill<'_> {
         // no path is longer than the number of nodes; the bound also ends cyclic trees
         for _ in 0..=self.nodes.len() {
             let Some(node) = usize::try_from(index).ok().and_then(|i| self.nodes.get(i)) else {
-                break;
+                break; // a leaf
             };
             let [x, y, z, distance] = node.plane;
             let normal = Vec3::new(x, y, z);

@@ -9,6 +9,7 @@ use std::collections::{HashMap, HashSet};
 
 use glam::Vec3;
 use shaders::types::constants as c;
+use support::slice;
 
 use super::input::{Kind, MaterialTable, StaticScene};
 
@@ -43,12 +44,9 @@ pub fn doubled(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> HashSe
         }
         let back = info.flags & c::MATERIAL_CULL_BACK != 0;
         for (i, corner) in scene.triangles(surface).iter().enumerate() {
-            let place = |i: u32| scene.vertices.get(i as usize).map(|v| v.position);
-            let [Some(p), Some(q), Some(r)] = corner.map(place) else {
-                continue;
-            };
+            let corners = corner.map(|i| slice::item(scene.vertices, i as usize).position);
             let first = surface.first_index as usize;
-            if let Some((plane, flat)) = flat(first + 3 * i, [p, q, r], back) {
+            if let Some((plane, flat)) = flat(first + 3 * i, corners, back) {
                 let (normal, distance) = plane;
                 let key = (surface.model, normal, distance);
                 planes.entry(key).or_default().push(flat);

@@ -9,7 +9,7 @@ use relight::light::{ClusterSet, STRONGEST, Sight};
 use shaders::trace_types as t;
 use shaders::trace_types::constants as c;
 use shaders::types::Instance;
-use support::Aabb;
+use support::{Aabb, slice};
 
 use super::lights::{
     ChangingLight, MapLights, count, number, sphere, sphere_bounds, triangle_bounds,
@@ -127,7 +127,7 @@ impl FrameLights {
         let mut entries = vec![0u32; first as usize];
         for (light, reach) in &self.reach {
             for cluster in reach.iter() {
-                let Some(row) = rows.get_mut(cluster) else {
+                let Some(row) = slice::get_mut(&mut rows, cluster) else {
                     continue;
                 };
                 if let Some(entry) = entries.get_mut((row.first + row.count) as usize) {

@@ -396,7 +396,7 @@ fn own_structures(
             corners.extend(members.iter().map(|t| t.indices.map(position)));
         }
         let Some(mut hierarchy) = build_triangles(&corners) else {
-            continue;
+            continue; // no triangle has an area
         };
         for triangle in &mut hierarchy.triangles {
             if let Some(&[part, primitive]) = places.get(triangle.primitive as usize) {

@@ -5,7 +5,7 @@
 
 use glam::{Vec3, Vec4};
 use shaders::types::{Instance, Vertex};
-use support::Aabb;
+use support::{Aabb, slice};
 
 use super::geometry::StaticGeometry;
 use super::input::{Kind, MaterialTable};
@@ -76,11 +76,11 @@ pub fn in_sight(
     let from = view.view.origin;
     let mut boxes = Vec::new();
     let mut add = |bounds: &Aabb, instance: u32| {
-        let Some(instance) = view.instances.get(instance as usize) else {
+        let Some(instance) = slice::get(&view.instances, instance as usize) else {
             return;
         };
         let Some(bounds) = placed(bounds, instance) else {
-            return;
+            return; // empty
         };
         if may_be_seen(&bounds, from, &frustum) {
             boxes.push(bounds);

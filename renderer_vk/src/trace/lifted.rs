@@ -8,6 +8,7 @@ use glam::Vec3;
 use relight::world::coplanar::{DrawOrder, Sheet, stack};
 use shaders::types::constants as c;
 use shaderscript::Cull;
+use support::slice;
 
 use super::input::{Kind, MaterialTable, StaticScene, StaticSurface};
 
@@ -41,13 +42,9 @@ fn triangles<'a>(
     scene: &'a StaticScene<'_>,
     surface: &StaticSurface,
 ) -> impl Iterator<Item = ([u32; 3], [Vec3; 3])> + 'a {
-    scene.triangles(surface).iter().filter_map(|&numbers| {
-        let place = |i: u32| scene.vertices.get(i as usize).map(|v| v.position);
-        let [Some(a), Some(b), Some(c)] = numbers.map(place) else {
-            return None;
-        };
-        Some((numbers, [a, b, c]))
-    })
+    let place = |i: u32| slice::item(scene.vertices, i as usize).position;
+    let triangles = scene.triangles(surface).iter();
+    triangles.map(move |&numbers| (numbers, numbers.map(place)))
 }
 
 fn sheet(scene: &StaticScene<'_>, materials: &dyn MaterialTable, surface: &StaticSurface) -> Sheet {

@@ -127,9 +127,7 @@ impl Cutter {
     fn cut(&mut self, piece: Piece) -> i32 {
         let sizes = piece.sizes();
         let axis = (0..3).fold(0, |a, b| if sizes.get(b) > sizes.get(a) { b } else { a });
-        let (Some(&from), Some(&to)) = (piece.from.get(axis), piece.to.get(axis)) else {
-            return -1;
-        };
+        let (from, to) = (piece.from[axis], piece.to[axis]);
         if to - from <= 1 {
             let cell = self.cell(&piece);
             self.made.leaf_cells.push(cell);
@@ -145,17 +143,13 @@ impl Cutter {
             (&mut front.bounds.mins, dist),
             (&mut back.bounds.maxs, dist),
         ] {
-            if let Some(v) = part.as_mut().get_mut(axis) {
-                *v = bound;
-            }
+            part[axis] = bound;
         }
         for (part, bound) in [(&mut front.from, middle), (&mut back.to, middle)] {
-            if let Some(v) = part.get_mut(axis) {
-                *v = bound;
-            }
+            part[axis] = bound;
         }
         let children = [self.cut(front), self.cut(back)];
-        let normal = Vec3::AXES.get(axis).copied().unwrap_or(Vec3::X);
+        let normal = Vec3::AXES[axis];
         if let Some(node) = self.made.nodes.get_mut(index) {
             *node = BspNode {
                 plane: normal.extend(dist).to_array(),

@@ -115,7 +115,7 @@ struct Parts {
 impl Parts {
     fn add(&mut self, polygon: &[Vec3], normal: Vec3) {
         let Some((&a, others)) = polygon.split_first() else {
-            return;
+            return; // clipped away
         };
         for (&b, &c) in others.iter().zip(others.iter().skip(1)) {
             let area = (b - a).cross(c - a).length() * 0.5;

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use shaders::trace_types::LightSlot;
-use support::slice::part_mut;
+use support::slice::{self, part_mut};
 
 /// Part of a row's probability that is distributed uniformly, so that a wrong estimate excludes no light.
 const EVEN_PART: f64 = 0.1;
@@ -71,7 +71,7 @@ pub fn append_slots(slots: &mut Vec<LightSlot>, entries: &[Entry]) {
             chance,
             visibility,
             ..
-        }) = row.get(high)
+        }) = slice::get(row, high)
         else {
             break;
         };

@@ -265,6 +265,7 @@ impl SortedTriangles {
     ) -> Option<u32> {
         let origin = match light.model {
             0 => Vec3::ZERO,
+            // A scene of a test has no origins.
             model => (source.model_origins.get(model as usize).copied()).unwrap_or_default(),
         };
         let placed = ChangingLight {
@@ -330,6 +331,7 @@ impl MapLights {
         // A scene without a map has no cells.
         let cells = cells.unwrap_or_default();
         let (rows, slots) = light_rows::rows(source, &sorted.numbers, &cells);
+        // Without a map as above.
         let bounds = source.bsp.and_then(|bsp| bsp.models.first());
         let (low, high) = bounds
             .map(|world| (world.mins, world.maxs))

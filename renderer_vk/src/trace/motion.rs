@@ -16,7 +16,7 @@ use glam::Vec3;
 use shaders::trace_types::constants::{LAST_MOVED, LAST_SAME};
 use shaders::trace_types::{LastInstance, MotionView, PortalRecord};
 use shaders::types::{Instance, Vertex};
-use support::slice::item;
+use support::slice::{self, item};
 
 use super::targets::Targets;
 use crate::api::{EntityKind, renderfx};
@@ -144,7 +144,7 @@ impl Motion {
             view.look.entities.iter().zip(matches).zip(&mut velocities)
         {
             let Some(last) = found_again.and_then(|i| past.entities.get(i)) else {
-                continue;
+                continue; // new
             };
             if passed > 0.0 {
                 *velocity = (entity.origin - last.origin) / passed;
@@ -229,9 +229,9 @@ impl Past {
             let now = entity.first_instance.saturating_add(i) as usize;
             let then = last.first_instance.saturating_add(i) as usize;
             let (Some(slot), Some(instance), Some(place)) = (
-                found.instances.get_mut(now),
-                view.instances.get(now),
-                self.places.get(then),
+                slice::get_mut(&mut found.instances, now),
+                slice::get(&view.instances, now),
+                slice::get(&self.places, then),
             ) else {
                 continue;
             };

@@ -434,7 +434,7 @@ impl Parts {
         self.members
             .sort_by(|a, b| a.key.cmp(&b.key).then(a.order.cmp(&b.order)));
         for members in self.members.chunk_by_mut(|a, b| a.key == b.key) {
-            let Some(&Member { key, order, .. }) = members.first() else {
+            let Some(&Member { key, order, .. }) = slice::get(members, 0) else {
                 continue;
             };
             let Some(instance) = slice::get(&view.instances, key.instance as usize) else {
@@ -483,6 +483,7 @@ impl Parts {
     ) {
         let slots = &mut self.slots;
         let Some(slot) = slots.iter_mut().find(|s| s.seen == seen && s.kind == kind) else {
+            debug_assert!(false, "no slot for {seen:?} {kind:?}");
             return;
         };
         let vertices = part(&view.vertices, span(mesh.first_vertex, mesh.vertex_count));
@@ -499,7 +500,7 @@ impl Parts {
                 position.is_finite().then_some(index)
             });
             let [Some(a), Some(b), Some(c)] = corners else {
-                continue;
+                continue; // a corner is not finite
             };
             slot.indices.push([a, b, c]);
             slot.triangles.push(Triangle {

@@ -238,7 +238,7 @@ fn is_flat(relit: &RelitWorld, surface: &relight::world::WorldSurface) -> bool {
     };
     surface
         .triangles()
-        .filter_map(|triangle| relit.triangle(triangle))
+        .map(|triangle| relit.triangle(triangle))
         .all(|[a, b, c]| {
             let front = (c - a).cross(b - a);
             // degenerate triangles have no direction

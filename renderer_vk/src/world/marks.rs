@@ -252,6 +252,7 @@ fn mark_curve(
     out: &mut Output,
 ) {
     let Some(lod) = &surface.lod else {
+        debug_assert!(false, "a patch without a grid");
         return;
     };
     let (width, height) = lod.size();

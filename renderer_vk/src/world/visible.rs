@@ -100,7 +100,9 @@ impl Tree {
         };
         let mut pending = Vec::from_iter(tree.root());
         while let Some(child) = pending.pop() {
-            let Child::Node(at) = child else { continue };
+            let Child::Node(at) = child else {
+                continue; // a leaf has no children
+            };
             for child in bsp.node(at).children {
                 let parent = match child {
                     Child::Node(node) => tree.nodes.get_mut(node.index()).map(|n| &mut n.parent),

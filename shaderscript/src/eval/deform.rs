@@ -268,7 +268,7 @@ fn text_quads(
     context: &DeformContext,
 ) {
     let Some(quad) = vertices.first_chunk::<4>() else {
-        return;
+        return; // the script gives it to a surface that is no quad
     };
     let normal = quad[0].normal;
     let mut origin = quad.iter().map(|v| v.position).sum::<Vec3>() * 0.25;

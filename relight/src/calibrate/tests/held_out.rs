@@ -42,7 +42,7 @@ fn places(samples: &[Sample], held_out: bool) -> HashSet<[u32; 6]> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(testkit::cases(24))]
 
     #[test]
     fn a_texel_is_fitted_or_held_out(
@@ -82,7 +82,7 @@ fn a_surface_gets_at_most_one_sample_a_texel() {
     // The first face is the floor or a wall of the room: a large part of its area.
     let world = coarse(48, 4);
     let samples = taken(&world, 3000, 1);
-    let [a, b, c] = world.triangle(0).unwrap();
+    let [a, b, c] = world.triangle(0);
     let normal = (b - a).cross(c - a).normalize();
     let on_first = samples
         .iter()

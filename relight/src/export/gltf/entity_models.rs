@@ -84,7 +84,7 @@ impl Document<'_> {
                     }
                 };
                 let Some(material) = material.as_ref() else {
-                    continue;
+                    continue; // not drawn
                 };
                 let part = &surface.part;
                 if part.indices.is_empty() {

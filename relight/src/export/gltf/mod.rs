@@ -260,7 +260,7 @@ impl Document<'_> {
                 out.push(base);
                 continue;
             }
-            let seen = |corners: [&WorldVertex; 3]| corners.iter().any(|v| layer.cover(v) > 0.0);
+            let seen = |corners: [WorldVertex; 3]| corners.iter().any(|v| layer.cover(v) > 0.0);
             let (upper, from) = layer.raise(part, height, look, &seen);
             if upper.indices.is_empty() {
                 continue;
@@ -345,9 +345,6 @@ impl Document<'_> {
         let mut images = Vec::with_capacity(self.textures.images.len());
         for image in &self.textures.images {
             let mut entry = json!({"name": image.path});
-            let Value::Object(map) = &mut entry else {
-                continue;
-            };
             if inside {
                 bytes.resize(bytes.len().next_multiple_of(4), 0);
                 views.push(json!({
@@ -356,12 +353,12 @@ impl Document<'_> {
                     "byteLength": image.bytes.len(),
                 }));
                 bytes.extend_from_slice(&image.bytes);
-                map.insert("bufferView".into(), json!(views.len() - 1));
-                map.insert("mimeType".into(), json!(image.mime.text()));
+                entry["bufferView"] = json!(views.len() - 1);
+                entry["mimeType"] = json!(image.mime.text());
             } else {
                 let path = format!("images/{}", image.path);
                 output.write_beside(&path, &image.bytes)?;
-                map.insert("uri".into(), json!(escaped(&path)));
+                entry["uri"] = json!(escaped(&path));
             }
             images.push(entry);
         }

@@ -134,7 +134,7 @@ fn number() -> impl Strategy<Value = f32> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(testkit::cases(40))]
 
     #[test]
     fn any_values_survive(

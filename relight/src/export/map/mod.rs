@@ -241,12 +241,9 @@ impl Writer<'_> {
     fn patch(&mut self, surface: &Surface, origin: Vec3) {
         let bsp = &self.world.bsp;
         let points = bsp.surface_vertices(surface);
-        let (Ok(width), Ok(height)) = (
-            usize::try_from(surface.patch_width),
-            usize::try_from(surface.patch_height),
-        ) else {
-            return;
-        };
+        // Checked by `Bsp::validate`.
+        let [width, height] =
+            [surface.patch_width, surface.patch_height].map(|n| n.max(0) as usize);
         let name = self.name(surface.shader);
         self.tally.patches += 1;
         self.line(format_args!(

@@ -48,7 +48,7 @@ fn an_emissive_quad_in_a_room() {
         assert!(!light.two_sided && !light.is_sky);
         assert_eq!(light.source, EmissionSource::SurfaceLight);
         assert_eq!(light.surface as usize, quad);
-        let corners = world.triangle(light.triangle as usize).unwrap();
+        let corners = world.triangle(light.triangle as usize);
         assert!(light.vertices.iter().all(|v| corners.contains(v)));
         assert_eq!(
             world.light_of_triangle(light.triangle as usize),

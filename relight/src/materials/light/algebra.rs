@@ -19,6 +19,7 @@
 use crate::overbright::{from_linear, to_linear};
 use glam::{Vec3, Vec4};
 use shaderscript::{BlendFactor, RgbGen, Stage, StageImage};
+use support::slice::part;
 
 /// What a stage shows at a point: texture and generated colour, before blending. Both linear, alpha in 0..1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -135,7 +136,7 @@ pub fn darkens_behind(stages: &[Stage], vertex_light: bool) -> bool {
     };
     let samples = vec![grey; stages.len()];
     stages.iter().enumerate().any(|(i, stage)| {
-        let below = stages.get(..i).unwrap_or_default();
+        let below = part(stages, ..i);
         let multiplies = stage.blend.is_some_and(|(source, destination)| {
             matches!(source, DstColor | OneMinusDstColor)
                 || matches!(destination, SrcColor | OneMinusSrcColor)

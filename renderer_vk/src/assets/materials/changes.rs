@@ -14,6 +14,7 @@ impl Materials {
     /// Finds a material that only `RemapShader` names. The engine assigns it the map's first lightmap page.
     fn find_with_first_page(&mut self, source: &mut dyn ImageSource, name: &str) -> u32 {
         let Some(page) = source.lightmap(0) else {
+            // A map without lightmaps.
             return self.find(source, name, LightmapClass::None, true);
         };
         let index = self.find(source, name, LightmapClass::Page, true);
@@ -62,7 +63,7 @@ impl Materials {
             return;
         }
         let Some(target) = usable(self, new) else {
-            return;
+            return; // `usable` has warned
         };
         let old = stripped(old);
         let cancels = old == stripped(new);
@@ -140,10 +141,11 @@ impl Materials {
     /// Removes the stages of a video that cannot be played, and all stages after each of them, as the engine does.
     pub fn drop_video(&mut self, client: usize) {
         for material in &mut self.list {
-            let Some(at) = material.videos.iter().position(|v| v.client == client) else {
-                continue;
+            let mut videos = material.videos.iter().enumerate();
+            let Some((at, video)) = videos.find(|(_, v)| v.client == client) else {
+                continue; // does not show the video
             };
-            let stage = material.videos.get(at).map_or(0, |v| v.stage);
+            let stage = video.stage;
             let kept = stage.saturating_sub(material.stage_first);
             material.videos.truncate(at);
             material.stage_count = kept;

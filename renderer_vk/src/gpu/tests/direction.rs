@@ -1,6 +1,6 @@
 //! Packed directions: the error is that of rounding, also along the axes.
 
-use super::support::{collect, device, finish};
+use super::support::{collect, compute, device, finish, readback};
 use crate::gpu::*;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -54,36 +54,18 @@ fn packed_directions_round_trip() {
             spare: i % 65536,
         })
         .collect();
-    let mut ring = FrameRing::new(&device, 2).unwrap();
     let pipeline =
         ComputePipeline::new(&device, "direction", &shaders::TEST_DIRECTION_COMP, &[]).unwrap();
     let bytes: &[u8] = bytemuck::cast_slice(&given);
-    let kept = Buffer::new(
-        &device,
-        &BufferDesc {
-            name: "directions",
-            size: bytes.len() as u64,
-            usage: BufferUsage::STORAGE,
-            memory: Memory::Readback,
-        },
-    )
-    .unwrap();
+    let kept = readback(&device, "directions", bytes.len());
     kept.write(0, bytes).unwrap();
     let count = u32::try_from(given.len()).unwrap();
-    let mut rec = ring.begin().unwrap();
-    let mut pass = rec
-        .pass("direction", Access::COMPUTE, Access::COMPUTE)
-        .unwrap();
-    pass.bind_compute(&pipeline);
-    pass.push(&Push {
+    let push = Push {
         directions: kept.address(),
         count,
         padding: 0,
-    });
-    pass.dispatch(count.div_ceil(64), 1, 1);
-    drop(pass);
-    ring.end(rec).unwrap();
-    device.wait_idle().unwrap();
+    };
+    compute(&device, &pipeline, &push, count);
     let mut bytes = vec![0; bytes.len()];
     kept.read(0, &mut bytes).unwrap();
     for (was, is) in given.iter().zip(collect::<Kept>(&bytes)) {
@@ -91,6 +73,6 @@ fn packed_directions_round_trip() {
         assert!(off < 8.0e-7, "{was:?} {is:?}: {off}");
         assert_eq!(was.spare, is.spare);
     }
-    drop((kept, ring, pipeline));
+    drop((kept, pipeline));
     finish(device);
 }

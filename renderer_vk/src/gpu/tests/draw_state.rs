@@ -1,18 +1,10 @@
 //! Blending, culling and depth tests of successive draws, on devices with these as dynamic state and on devices
 //! without.
 
-use super::support::{device, finish, poor_device};
+use super::support::{device, draw_corners, finish, image, poor_device, rendering, triangles};
 use crate::gpu::*;
-use bytemuck::{Pod, Zeroable};
 
 const SIZE: u32 = 32;
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Draw {
-    corners: u64,
-    color: [f32; 4],
-}
 
 /// Effect of a draw on its own pixel.
 #[derive(Clone, Copy)]
@@ -74,27 +66,21 @@ fn expected(state: State, z: f32) -> [u8; 3] {
 }
 
 fn draws_keep_their_own_state(device: Device) {
-    let image = |name, format, usage| {
-        Image::new(&device, &ImageDesc::new(name, SIZE, SIZE, format, usage)).unwrap()
-    };
-    let color = image("color", Format::Rgba8, ImageUsage::COLOR);
-    let depth = image("depth", Format::D32F, ImageUsage::DEPTH);
-    let desc = GraphicsDesc {
-        color: Some(Format::Rgba8),
-        depth: Some(Format::D32F),
-        ..GraphicsDesc::new(
-            "state",
-            &shaders::TEST_TRIANGLE_VERT,
-            &shaders::TEST_TRIANGLE_FRAG,
-        )
-    };
+    let color = image(
+        &device,
+        "color",
+        [SIZE; 2],
+        Format::Rgba8,
+        ImageUsage::COLOR,
+    );
+    let depth = image(&device, "depth", [SIZE; 2], Format::D32F, ImageUsage::DEPTH);
     let make = |state: State| {
         let desc = GraphicsDesc {
             cull: state.cull,
             depth_test: state.test,
             depth_write: state.write,
             blend: state.blend,
-            ..desc
+            ..triangles("state", Format::D32F)
         };
         GraphicsPipeline::new(&device, &desc).unwrap()
     };
@@ -119,32 +105,19 @@ fn draws_keep_their_own_state(device: Device) {
     };
     let places: Vec<u64> = cases.iter().map(|(_, z)| corners(*z)).collect();
     let tested = corners(0.6);
-    let mut pass = rec
-        .pass("state", Access::GRAPHICS, Access::GRAPHICS)
-        .unwrap();
-    pass.begin_rendering(&Rendering {
+    let target = Rendering {
         color: Some(&color),
         depth: Some(&depth),
         clear_color: Some([0.4, 0.0, 0.0, 1.0]),
         clear_depth: Some(0.5),
-    })
-    .unwrap();
-    for (i, pipeline) in (0..).zip(&pipelines) {
+    };
+    let mut pass = rendering(&mut rec, &target);
+    for (i, (pipeline, corners)) in (0..).zip(pipelines.iter().zip(places)) {
         pass.set_scissor(i % SIZE as i32, i / SIZE as i32, 1, 1);
-        pass.bind_graphics(pipeline);
-        pass.push(&Draw {
-            corners: places[i as usize],
-            color: [0.6, 0.0, 0.0, 1.0],
-        });
-        pass.draw(3, 1, 0, 0);
+        draw_corners(&mut pass, pipeline, corners, [0.6, 0.0, 0.0, 1.0]);
     }
     pass.set_scissor(0, 0, SIZE, SIZE);
-    pass.bind_graphics(&probe);
-    pass.push(&Draw {
-        corners: tested,
-        color: [0.0, 0.0, 1.0, 0.0],
-    });
-    pass.draw(3, 1, 0, 0);
+    draw_corners(&mut pass, &probe, tested, [0.0, 0.0, 1.0, 0.0]);
     drop(pass);
     ring.end(rec).unwrap();
     let bytes = device.read_image(&color).unwrap();

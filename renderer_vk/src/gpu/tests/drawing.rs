@@ -1,44 +1,17 @@
 //! Graphics pipelines: depth, blending, culling, stencils, channel masks, multisampling.
 
-use super::support::{collect, device, finish};
+use super::support::{
+    Draw, collect, device, draw_corners, finish, image, pixel, rendering, triangles,
+};
 use crate::gpu::*;
-use bytemuck::{Pod, Zeroable};
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Draw {
-    corners: u64,
-    color: [f32; 4],
-}
 
 #[test]
 fn triangles_are_drawn_with_depth_blend_and_culling() {
     let Some(device) = device(true) else { return };
-    let color = Image::new(
-        &device,
-        &ImageDesc::new(
-            "color",
-            32,
-            32,
-            Format::Rgba8,
-            ImageUsage::COLOR | ImageUsage::SAMPLED,
-        ),
-    )
-    .unwrap();
-    let depth = Image::new(
-        &device,
-        &ImageDesc::new("depth", 32, 32, Format::D32F, ImageUsage::DEPTH),
-    )
-    .unwrap();
-    let desc = GraphicsDesc {
-        color: Some(Format::Rgba8),
-        depth: Some(Format::D32F),
-        ..GraphicsDesc::new(
-            "solid",
-            &shaders::TEST_TRIANGLE_VERT,
-            &shaders::TEST_TRIANGLE_FRAG,
-        )
-    };
+    let usage = ImageUsage::COLOR | ImageUsage::SAMPLED;
+    let color = image(&device, "color", [32; 2], Format::Rgba8, usage);
+    let depth = image(&device, "depth", [32; 2], Format::D32F, ImageUsage::DEPTH);
+    let desc = triangles("solid", Format::D32F);
     let solid = GraphicsPipeline::new(&device, &desc).unwrap();
     let additive = GraphicsPipeline::new(
         &device,
@@ -78,16 +51,13 @@ fn triangles_are_drawn_with_depth_blend_and_culling() {
             .copy_from_slice(bytemuck::cast_slice(&[0u32, 1, 2]));
         (slice.buffer().clone(), slice.offset)
     };
-    let mut pass = rec
-        .pass("draw", Access::GRAPHICS, Access::GRAPHICS)
-        .unwrap();
-    pass.begin_rendering(&Rendering {
+    let target = Rendering {
         color: Some(&color),
         depth: Some(&depth),
         clear_color: Some([0.0, 0.0, 0.0, 1.0]),
         clear_depth: Some(1.0),
-    })
-    .unwrap();
+    };
+    let mut pass = rendering(&mut rec, &target);
     let draw = |pass: &mut Pass<'_>, pipeline: &GraphicsPipeline, corners: u64, color| {
         pass.bind_graphics(pipeline);
         pass.push(&Draw { corners, color });
@@ -112,10 +82,7 @@ fn triangles_are_drawn_with_depth_blend_and_culling() {
     drop(pass);
     ring.end(rec).unwrap();
     let bytes = device.read_image(&color).unwrap();
-    let at = |x: usize, y: usize| {
-        let i = (y * 32 + x) * 4;
-        [bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]
-    };
+    let at = |x, y| pixel(&bytes, x, y);
     assert_eq!(at(4, 20), [255, 0, 255, 255], "below the diagonal");
     assert_eq!(at(20, 4), [0, 255, 0, 255], "above the diagonal");
     assert_eq!(at(31, 0), [255, 255, 0, 255], "in the scissor");
@@ -126,11 +93,7 @@ fn triangles_are_drawn_with_depth_blend_and_culling() {
     assert_eq!(depths[4 * 32 + 20], 0.5);
 
     // Blits: enlarge and mirror.
-    let double = Image::new(
-        &device,
-        &ImageDesc::new("double", 64, 64, Format::Rgba8, ImageUsage::COLOR),
-    )
-    .unwrap();
+    let double = image(&device, "double", [64; 2], Format::Rgba8, ImageUsage::COLOR);
     device
         .immediate(|rec| {
             let mut pass = rec.pass("blit", Access::TRANSFER, Access::TRANSFER)?;
@@ -154,37 +117,18 @@ fn triangles_are_drawn_with_depth_blend_and_culling() {
     finish(device);
 }
 
-/// Draws a triangle without indices.
-fn draw_corners(pass: &mut Pass<'_>, pipeline: &GraphicsPipeline, corners: u64, color: [f32; 4]) {
-    pass.bind_graphics(pipeline);
-    pass.push(&Draw { corners, color });
-    pass.draw(3, 1, 0, 0);
-}
-
 #[test]
 fn stencils_count_and_masks_hold_channels_back() {
     let Some(device) = device(true) else { return };
     let format = device.depth_format(true);
-    let image = |name, format, usage| {
-        Image::new(&device, &ImageDesc::new(name, 32, 32, format, usage)).unwrap()
-    };
-    let color = image("color", Format::Rgba8, ImageUsage::COLOR);
-    let depth = image("depth", format, ImageUsage::DEPTH);
-    let desc = GraphicsDesc {
-        color: Some(Format::Rgba8),
-        depth: Some(format),
-        ..GraphicsDesc::new(
-            "stencil",
-            &shaders::TEST_TRIANGLE_VERT,
-            &shaders::TEST_TRIANGLE_FRAG,
-        )
-    };
+    let color = image(&device, "color", [32; 2], Format::Rgba8, ImageUsage::COLOR);
+    let depth = image(&device, "depth", [32; 2], format, ImageUsage::DEPTH);
     let pipeline = |stencil, color_write| {
         let desc = GraphicsDesc {
             stencil,
             color_write,
             depth_write: false,
-            ..desc
+            ..triangles("stencil", format)
         };
         GraphicsPipeline::new(&device, &desc).unwrap()
     };
@@ -204,16 +148,13 @@ fn stencils_count_and_masks_hold_channels_back() {
     let all = rec.arena().push(&full(0.5)).unwrap();
     let hidden = rec.arena().push(&full(0.9)).unwrap();
     let lower = rec.arena().push(&half(0.5)).unwrap();
-    let mut pass = rec
-        .pass("stencil", Access::GRAPHICS, Access::GRAPHICS)
-        .unwrap();
-    pass.begin_rendering(&Rendering {
+    let target = Rendering {
         color: Some(&color),
         depth: Some(&depth),
         clear_color: Some([1.0, 0.0, 0.0, 1.0]),
         clear_depth: Some(0.75),
-    })
-    .unwrap();
+    };
+    let mut pass = rendering(&mut rec, &target);
     pass.clear_stencil_rect([0, 0, 32, 32]);
     // below the diagonal: 0, not below it and back to 1; above it: 1, then 0
     draw_corners(&mut pass, &down, lower, [0.0; 4]);
@@ -228,10 +169,7 @@ fn stencils_count_and_masks_hold_channels_back() {
     drop(pass);
     ring.end(rec).unwrap();
     let bytes = device.read_image(&color).unwrap();
-    let at = |x: usize, y: usize| {
-        let i = (y * 32 + x) * 4;
-        [bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]
-    };
+    let at = |x, y| pixel(&bytes, x, y);
     assert_eq!(at(4, 20), [255, 255, 255, 255], "stencil 1, red kept");
     assert_eq!(at(10, 4), [255, 0, 0, 255], "stencil 0");
     assert_eq!(at(20, 30), [255, 0, 0, 255], "cleared");
@@ -261,20 +199,11 @@ fn several_samples_are_averaged_along_edges() {
     let plain = image("plain", Format::D32F, ImageUsage::DEPTH, 1).unwrap();
     let one = image("one", Format::Rgba8, ImageUsage::COLOR, 1).unwrap();
     assert!(image("odd", Format::Rgba8, ImageUsage::COLOR, 3).is_err());
-    let pipeline = GraphicsPipeline::new(
-        &device,
-        &GraphicsDesc {
-            color: Some(Format::Rgba8),
-            depth: Some(Format::D32F),
-            samples: 4,
-            ..GraphicsDesc::new(
-                "edges",
-                &shaders::TEST_TRIANGLE_VERT,
-                &shaders::TEST_TRIANGLE_FRAG,
-            )
-        },
-    )
-    .unwrap();
+    let desc = GraphicsDesc {
+        samples: 4,
+        ..triangles("edges", Format::D32F)
+    };
+    let pipeline = GraphicsPipeline::new(&device, &desc).unwrap();
     let mut ring = FrameRing::new(&device, 2).unwrap();
     let mut rec = ring.begin().unwrap();
     let half: [[f32; 3]; 3] = [[-1.0, -1.0, 0.5], [1.0, 1.0, 0.5], [-1.0, 1.0, 0.5]];
@@ -305,7 +234,7 @@ fn several_samples_are_averaged_along_edges() {
     drop(pass);
     ring.end(rec).unwrap();
     let bytes = device.read_image(&one).unwrap();
-    let red = |x: usize, y: usize| bytes[(y * 32 + x) * 4];
+    let red = |x, y| pixel(&bytes, x, y)[0];
     assert_eq!((red(4, 20), red(20, 4)), (255, 0));
     let edge = red(10, 10);
     assert!(edge > 0 && edge < 255, "{edge}");

@@ -1,6 +1,6 @@
 //! Functions of `relight::exposure` and `relight::overbright` that repeat those of the shaders.
 
-use super::support::{collect, device, finish};
+use super::support::{collect, compute, device, finish, readback};
 use crate::gpu::*;
 use relight::exposure::{BRIGHT_PART, DARK_PART, DARKEST, tone_curve};
 use relight::overbright::{from_linear, to_linear};
@@ -9,7 +9,6 @@ use shaders::trace_types::FilterStep;
 #[test]
 fn constants_and_curves_are_those_of_the_shaders() {
     let Some(device) = device(false) else { return };
-    let mut ring = FrameRing::new(&device, 2).unwrap();
     let shader = &shaders::TEST_EXPOSURE_COMP;
     let pipeline = ComputePipeline::new(&device, "exposure", shader, &[]).unwrap();
     const STEPS: u32 = 256;
@@ -19,33 +18,19 @@ fn constants_and_curves_are_those_of_the_shaders() {
         expected.extend([tone_curve(x), to_linear(x), from_linear(x)]);
     }
     let mut bytes = vec![0; size_of_val(&expected[..])];
-    let desc = BufferDesc {
-        name: "results",
-        size: bytes.len() as u64,
-        usage: BufferUsage::STORAGE,
-        memory: Memory::Readback,
-    };
-    let buffer = Buffer::new(&device, &desc).unwrap();
-    let mut rec = ring.begin().unwrap();
-    let mut pass = rec
-        .pass("exposure", Access::COMPUTE, Access::COMPUTE)
-        .unwrap();
-    pass.bind_compute(&pipeline);
-    pass.push(&FilterStep {
+    let buffer = readback(&device, "results", bytes.len());
+    let push = FilterStep {
         target: buffer.address(),
         spacing: STEPS,
         ..FilterStep::default()
-    });
-    pass.dispatch(STEPS.div_ceil(64), 1, 1);
-    drop(pass);
-    ring.end(rec).unwrap();
-    device.wait_idle().unwrap();
+    };
+    compute(&device, &pipeline, &push, STEPS);
     buffer.read(0, &mut bytes).unwrap();
     let found: Vec<f32> = collect(&bytes);
     for (found, expected) in found.iter().zip(&expected) {
         let near = (found - expected).abs() <= 1e-5 * expected.abs().max(1.0);
         assert!(near, "{found}, not {expected}");
     }
-    drop((ring, pipeline, buffer));
+    drop((pipeline, buffer));
     finish(device);
 }

@@ -1,6 +1,6 @@
 //! Lifetime of objects and of the device: the graveyard, the pipeline cache, failed requests, drops with pending work.
 
-use super::support::{device, finish};
+use super::support::{device, finish, image};
 use crate::gpu::*;
 
 #[test]
@@ -12,11 +12,13 @@ fn dropped_objects_wait_for_their_frame_and_no_longer() {
         let mut rec = ring.begin().unwrap();
         let a =
             Buffer::with_data(&device, "short-lived", BufferUsage::STORAGE, &[3u8; 4096]).unwrap();
-        let b = Image::new(
+        let b = image(
             &device,
-            &ImageDesc::new("short-lived", 16, 16, Format::Rgba8, ImageUsage::SAMPLED),
-        )
-        .unwrap();
+            "short-lived",
+            [16; 2],
+            Format::Rgba8,
+            ImageUsage::SAMPLED,
+        );
         device.upload_image(&b, 0, 0, &[9; 1024]).unwrap();
         let c = Buffer::new(
             &device,
@@ -80,13 +82,13 @@ fn a_pipeline_cache_survives_a_restart_and_damage() {
 #[test]
 fn impossible_requests_are_errors() {
     let Some(device) = device(true) else { return };
-    let image = |w, h, format, usage| {
+    let made = |w, h, format, usage| {
         Image::new(&device, &ImageDesc::new("impossible", w, h, format, usage)).map(|_| ())
     };
-    assert!(image(0, 4, Format::Rgba8, ImageUsage::SAMPLED).is_err());
-    assert!(image(u32::MAX, 4, Format::Rgba8, ImageUsage::SAMPLED).is_err());
-    assert!(image(4, 4, Format::D32F, ImageUsage::COLOR).is_err());
-    assert!(image(4, 4, Format::Bc1, ImageUsage::STORAGE).is_err());
+    assert!(made(0, 4, Format::Rgba8, ImageUsage::SAMPLED).is_err());
+    assert!(made(u32::MAX, 4, Format::Rgba8, ImageUsage::SAMPLED).is_err());
+    assert!(made(4, 4, Format::D32F, ImageUsage::COLOR).is_err());
+    assert!(made(4, 4, Format::Bc1, ImageUsage::STORAGE).is_err());
     let huge = Buffer::new(
         &device,
         &BufferDesc {
@@ -100,16 +102,8 @@ fn impossible_requests_are_errors() {
         matches!(huge, Err(Error::OutOfMemory { .. } | Error::Vulkan { .. })),
         "{huge:?}"
     );
-    let color = Image::new(
-        &device,
-        &ImageDesc::new("color", 8, 8, Format::Rgba8, ImageUsage::COLOR),
-    )
-    .unwrap();
-    let other = Image::new(
-        &device,
-        &ImageDesc::new("depth", 8, 9, Format::D32F, ImageUsage::DEPTH),
-    )
-    .unwrap();
+    let color = image(&device, "color", [8, 8], Format::Rgba8, ImageUsage::COLOR);
+    let other = image(&device, "depth", [8, 9], Format::D32F, ImageUsage::DEPTH);
     device
         .immediate(|rec| {
             let mut pass = rec.pass("wrong", Access::GRAPHICS, Access::GRAPHICS)?;

@@ -1,6 +1,6 @@
 //! Buffers, images and textures: uploads, compute shaders that read and write them, levels, sampling by index.
 
-use super::support::{collect, device, finish};
+use super::support::{collect, device, finish, image, readback};
 use crate::gpu::upload::ImageRegion;
 use crate::gpu::*;
 use bytemuck::{Pod, Zeroable};
@@ -52,27 +52,9 @@ fn compute_writes_a_storage_image_and_reads_by_address() {
     // Another compilation of the same file, requested by a comment in it.
     let twice =
         ComputePipeline::new(&device, "twice", &shaders::TEST_FILL_COMP_TWICE, &added).unwrap();
-    let image = Image::new(
-        &device,
-        &ImageDesc::new(
-            "target",
-            61,
-            35,
-            Format::Rgba32F,
-            ImageUsage::STORAGE | ImageUsage::SAMPLED,
-        ),
-    )
-    .unwrap();
-    let result = Buffer::new(
-        &device,
-        &BufferDesc {
-            name: "result",
-            size: 4,
-            usage: BufferUsage::STORAGE,
-            memory: Memory::Readback,
-        },
-    )
-    .unwrap();
+    let usage = ImageUsage::STORAGE | ImageUsage::SAMPLED;
+    let image = image(&device, "target", [61, 35], Format::Rgba32F, usage);
+    let result = readback(&device, "result", 4);
     for frame in 1..=5u32 {
         let mut rec = ring.begin().unwrap();
         assert!(ring.begin().is_err(), "one frame at a time");

@@ -1,6 +1,6 @@
 //! The shaders' random numbers: stratified over frames, otherwise independent.
 
-use super::support::{collect, device, finish};
+use super::support::{collect, compute, device, finish, readback};
 use crate::gpu::*;
 use bytemuck::{Pod, Zeroable};
 
@@ -29,7 +29,6 @@ struct Push {
 
 struct Source {
     device: Device,
-    ring: FrameRing,
     pipeline: ComputePipeline,
 }
 
@@ -37,7 +36,6 @@ impl Source {
     fn new() -> Option<Self> {
         let device = device(true)?;
         Some(Self {
-            ring: FrameRing::new(&device, 2).unwrap(),
             pipeline: ComputePipeline::new(&device, "random", &shaders::TEST_RANDOM_COMP, &[])
                 .unwrap(),
             device,
@@ -45,41 +43,24 @@ impl Source {
     }
 
     /// The numbers of each of `pixels` pixels in `count` frames from `first` on, frame by frame.
-    fn draw(&mut self, first: u32, count: u32, pixels: u32, stream: u32) -> Vec<Drawn> {
+    fn draw(&self, first: u32, count: u32, pixels: u32, stream: u32) -> Vec<Drawn> {
         let size = (count * pixels) as usize * size_of::<Drawn>();
-        let draws = Buffer::new(
-            &self.device,
-            &BufferDesc {
-                name: "draws",
-                size: size as u64,
-                usage: BufferUsage::STORAGE,
-                memory: Memory::Readback,
-            },
-        )
-        .unwrap();
-        let mut rec = self.ring.begin().unwrap();
-        let mut pass = rec
-            .pass("random", Access::COMPUTE, Access::COMPUTE)
-            .unwrap();
-        pass.bind_compute(&self.pipeline);
-        pass.push(&Push {
+        let draws = readback(&self.device, "draws", size);
+        let push = Push {
             draws: draws.address(),
             first,
             count,
             pixels,
             stream,
-        });
-        pass.dispatch((count * pixels).div_ceil(64), 1, 1);
-        drop(pass);
-        self.ring.end(rec).unwrap();
-        self.device.wait_idle().unwrap();
+        };
+        compute(&self.device, &self.pipeline, &push, count * pixels);
         let mut bytes = vec![0; size];
         draws.read(0, &mut bytes).unwrap();
         collect(&bytes)
     }
 
     fn finish(self) {
-        drop((self.ring, self.pipeline));
+        drop(self.pipeline);
         finish(self.device);
     }
 }
@@ -99,7 +80,7 @@ fn assert_one_each(numbers: impl ExactSizeIterator<Item = f32>, what: &str) {
 
 #[test]
 fn each_elementary_interval_has_one_point_of_a_row_of_frames() {
-    let Some(mut source) = Source::new() else {
+    let Some(source) = Source::new() else {
         return;
     };
     // the first frames, and runs of 2^k frames that begin at a multiple of 2^k, late enough to use all digits
@@ -148,7 +129,7 @@ fn assert_independent(pairs: impl Iterator<Item = (f32, f32)>, what: &str) {
 
 #[test]
 fn random_numbers_of_one_frame_are_independent() {
-    let Some(mut source) = Source::new() else {
+    let Some(source) = Source::new() else {
         return;
     };
     const PIXELS: u32 = 64 * 256;
@@ -191,7 +172,7 @@ fn random_numbers_of_one_frame_are_independent() {
 
 #[test]
 fn random_sequences_of_a_pixel_are_independent() {
-    let Some(mut source) = Source::new() else {
+    let Some(source) = Source::new() else {
         return;
     };
     for pixel in source.draw(0, 1 << 14, 4, 1).chunks(1 << 14) {
@@ -218,7 +199,7 @@ fn random_sequences_of_a_pixel_are_independent() {
 
 #[test]
 fn choices_by_one_number_take_their_share_and_leave_it_uniform() {
-    let Some(mut source) = Source::new() else {
+    let Some(source) = Source::new() else {
         return;
     };
     const FRAMES: u32 = 7 << 9;

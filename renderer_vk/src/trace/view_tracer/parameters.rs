@@ -77,6 +77,7 @@ impl ViewTracer {
             images: image_view(targets),
             target: self.target_view(traced),
             camera: camera_view(traced, targets.height),
+            // The first view has no predecessor.
             last_camera: self.history.unwrap_or_default(),
             width: targets.width,
             height: targets.height,
