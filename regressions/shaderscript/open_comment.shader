@@ -1,0 +1,6 @@
+open
+{
+	{
+		map a
+	}
+} /* and no end

@@ -1,0 +1,7 @@
+zero
+{
+	{
+		map a
+		tcMod stretch sin 0 0 0 0
+	}
+}
