@@ -2,10 +2,8 @@
 
 use crate::boundary::entry;
 use crate::c_tests::{compile, scratch, source};
-use crate::engine::{self, error_level};
+use crate::engine::{self, Table, error_level};
 use crate::failure::Failure;
-use crate::ioq3::abi::refimport_t;
-use crate::ioq3::services::Ioq3;
 use crate::session;
 use libloading::Library;
 use std::ffi::{CStr, c_char, c_int};
@@ -37,13 +35,13 @@ impl TestEngine {
         // SAFETY: our own C code without initialisers.
         let library = unsafe { Library::new(&file) }.unwrap();
         std::fs::remove_dir_all(&folder).unwrap();
-        // SAFETY: every entry of the table is an optional function pointer; zero is `None`.
-        let mut table: refimport_t = unsafe { std::mem::zeroed() };
         // SAFETY: the signatures are those of test_engine.c.
         unsafe {
-            table.Printf = Some(*library.get(b"test_printf\0").unwrap());
-            table.Error = Some(*library.get(b"test_error\0").unwrap());
-            Ioq3::install(table);
+            engine::install(Table {
+                printf: Some(*library.get(b"test_printf\0").unwrap()),
+                error: Some(*library.get(b"test_error\0").unwrap()),
+                ..Table::EMPTY
+            });
         }
         session::reset();
         let engine = Self {
@@ -99,8 +97,8 @@ impl TestEngine {
 impl Drop for TestEngine {
     fn drop(&mut self) {
         // No code may print through a closed library.
-        // SAFETY: zero is `None` for each entry.
-        unsafe { Ioq3::install(std::mem::zeroed()) };
+        // SAFETY: it has no functions.
+        unsafe { engine::install(Table::EMPTY) };
     }
 }
 
@@ -192,7 +190,7 @@ extern "C" fn shuts_down_inside() {
     // The engine's calls before its jump.
     for _ in 0..2 {
         // SAFETY: on the thread that installed the engine, from a frame that owns nothing.
-        unsafe { crate::ioq3::shutdown_for_tests(0) };
+        unsafe { crate::lifecycle::shutdown(0) };
     }
     DROPPED.fetch_add(100, Ordering::SeqCst);
 }

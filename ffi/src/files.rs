@@ -52,7 +52,16 @@ impl GameFiles for EngineFiles {
         };
         match (dir, CString::new(suffix)) {
             (Some(dir), Ok(extension)) if session::on_main_thread() => {
-                self.engine.list_files(&dir, &extension)
+                let mut names = Vec::new();
+                if dir.as_c_str() == c"scripts" && extension.as_c_str() == c".shader" {
+                    let front = self.engine.front_end();
+                    for more in front.map_or(&[][..], |front| front.scripts) {
+                        names.extend(self.engine.list_files(&dir, more));
+                    }
+                }
+                // definitions in later files replace those in earlier ones
+                names.extend(self.engine.list_files(&dir, &extension));
+                names
             }
             _ => Vec::new(),
         }

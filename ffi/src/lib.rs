@@ -10,21 +10,23 @@
 //! - The library stays mapped after the engine unloads it (`-z nodelete`), because code that has run a thread cannot be
 //!   unmapped safely. Statics therefore outlive an unload, and each `GetRefAPI` resets all state. No thread outlives a
 //!   call.
-//! - The engine is identified before any service but `Printf` is called (`ioq3::recognize`): other engines have the
-//!   same version number with other tables.
+//! - The engine is recognized before any service but `Printf` is called (`recognize`): engines have the same version
+//!   number with different tables.
 //! - When the engine's `Error` is called, which leaves by `longjmp`, no panic is in progress and no destructor is
 //!   pending on the stack ([`boundary`]). A service from which the engine leaves by `longjmp` can leak memory, but the
 //!   state stays consistent ([`session`]).
 //! - If there is no usable Vulkan device, which `GetRefAPI` tests, the engine's own OpenGL renderer is loaded from the
-//!   folder of this library and replaces this one (`ioq3::fallback`). If the device fails later, with the real window,
+//!   folder of this library and replaces this one (`fallback`). If the device fails later, with the real window,
 //!   the game ends with a message that explains how to start with another renderer: the engine supports no other way
 //!   then.
 //!
 //! # Modules
-//! [`engine`] is the lowest module: the engine's services, as a trait. All other modules but [`ioq3`] call the engine
-//! through it and use no structure of the engine's ABI. [`ioq3`] is the highest: it implements the services with
-//! ioquake3's table and holds the exports.
+//! [`abi`] holds the structures that all engines share, `engine` the services of any engine as methods over one internal
+//! table. A front end ([`ioq3`], [`openarena`], [`quake3e`]) is one folder: the engine's tables, a function that fills the
+//! internal table, the table of exports, and a row of what is particular to the engine. The other modules name no engine;
+//! `front_ends` lists the front ends. `docs/port-to-your-engine.md` explains how to add one.
 
+pub mod abi;
 mod boundary;
 #[cfg(test)]
 mod boundary_tests;
@@ -34,38 +36,44 @@ mod capture;
 mod cinematics;
 mod commands;
 mod config;
+mod convert;
 mod costs;
 mod cvars;
 mod delivery;
 mod engine;
+mod exports;
 mod failure;
+mod fallback;
 mod files;
-mod ioq3;
+mod front_ends;
+mod glconfig;
+pub mod ioq3;
+mod lifecycle;
+mod load;
 mod logging;
+pub mod openarena;
+pub mod quake3e;
+mod recognize;
+mod scene;
 mod session;
 mod speeds;
 mod window;
 
-use ioq3::abi::{refexport_t, refimport_t};
-use std::ffi::c_int;
+use std::ffi::{c_int, c_void};
 
 /// Entry point: takes the engine's functions, returns ours; null if the engine has another version of the interface or
-/// other tables.
+/// unknown tables.
 ///
 /// # Safety
-/// - `imports` must be null (the result is then null) or point at the import table of an ioquake3 engine. The table is
-///   copied: it need not outlive the call. Its functions must be callable until the process ends.
+/// - `imports` must be null (the result is then null) or point at the import table of an engine of the family. The table
+///   is copied: it need not outlive the call. Its functions must be callable until the process ends.
 /// - The call must come from the engine's main thread while none of our functions runs.
 ///
 /// The result is static and valid until the next `GetRefAPI`. Its functions have the *call contract* in the module
 /// documentation of `boundary`.
 #[allow(non_snake_case)] // the engine requires this name
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn GetRefAPI(
-    api_version: c_int,
-    imports: *const refimport_t,
-) -> *const refexport_t {
-    // SAFETY: `imports` is null or an ioquake3 engine's table, and the thread is the main one, by this function's
-    // contract.
-    unsafe { ioq3::get_ref_api(api_version, imports) }
+pub unsafe extern "C" fn GetRefAPI(api_version: c_int, imports: *const c_void) -> *const c_void {
+    // SAFETY: `imports` is null or an engine's table, and the thread is the main one, by this function's contract.
+    unsafe { load::get_ref_api(api_version, imports) }
 }

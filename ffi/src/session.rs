@@ -50,6 +50,10 @@ pub struct Front {
     pub frame_start: Option<Instant>,
     /// The renderer has finished a frame.
     pub has_picture: bool,
+    /// The engine does not want to see the next frame.
+    pub skip_present: bool,
+    /// The last shutdown kept the window or the device, for a `GetRefAPI` that may come before the next registration.
+    pub kept: bool,
     /// The warning about a NaN origin has been printed.
     pub warned_bad_origin: bool,
 }
@@ -83,6 +87,11 @@ pub fn on_main_thread() -> bool {
 pub fn reset() {
     *MAIN.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread::current().id());
     start_over();
+}
+
+/// Whether the state is one that a shutdown kept for the next registration: it must not be reset.
+pub fn is_kept() -> bool {
+    on_main_thread() && !STATE.taken.get() && with(|session| session.front.kept) == Some(true)
 }
 
 fn start_over() {

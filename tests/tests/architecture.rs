@@ -207,6 +207,25 @@ fn no_modules_of_a_crate_use_each_other_in_a_circle() {
 }
 
 #[test]
+fn front_ends_alone_name_engines() {
+    const NAMES: [&str; 4] = ["ioq3", "ioquake", "quake3e", "openarena"];
+    let root = tests::data::repository().join("ffi/src");
+    let mut files = Vec::new();
+    sources(&root, &mut files);
+    for path in files {
+        let inside = path.strip_prefix(&root).expect("a file of the crate");
+        let place = inside.to_string_lossy();
+        let list = ["lib.rs", "front_ends.rs", "boundary_tests.rs"];
+        if list.contains(&&*place) || NAMES.iter().any(|name| place.starts_with(name)) {
+            continue;
+        }
+        let code = code(&path).to_lowercase();
+        let named = NAMES.iter().find(|name| code.contains(**name));
+        assert_eq!(named, None, "{place}");
+    }
+}
+
+#[test]
 fn the_test_command_runs_every_program_of_this_crate() {
     let root = tests::data::repository();
     let command = read(&root.join("test"));

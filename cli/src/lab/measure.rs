@@ -226,7 +226,7 @@ impl Lights {
             origin: camera.origin + forward * LIGHT_DISTANCE + left * offset,
             radius: LIGHT_REACH,
             color: Vec3::new(1.0, 0.75, 0.4),
-            additive: false,
+            ..DynamicLight::default()
         }
     }
 

@@ -10,7 +10,7 @@ pub use table::Cvar;
 
 use std::ffi::{CString, c_int};
 
-use crate::engine::{Engine, Services, Variable, cvar_flags};
+use crate::engine::{Engine, Variable, cvar_flags};
 use renderer_vk::settings::{Kind, ROWS, Reading, Row, Spec, flags};
 use table::{TABLE, UNUSED};
 
@@ -56,14 +56,42 @@ fn engine_flags(spec: &Spec) -> c_int {
     set.map(|(_, engines)| engines).sum()
 }
 
+/// The default of a variable in this engine.
+fn default_of(engine: Engine, spec: &Spec) -> &'static str {
+    let mut given = engine
+        .front_end()
+        .map_or(&[][..], |front| front.defaults)
+        .iter();
+    given
+        .find(|(name, _)| *name == spec.name)
+        .map_or(spec.default, |(_, default)| default)
+}
+
+/// Whether the engine registers this variable itself.
+fn is_owned(engine: Engine, spec: &Spec) -> bool {
+    let owned = engine.front_end().map_or(&[][..], |front| front.owned);
+    owned
+        .iter()
+        .any(|name| name.eq_ignore_ascii_case(spec.name))
+}
+
 /// Finds or makes a variable.
-pub fn get(engine: &dyn Services, spec: &Spec) -> Option<Variable> {
-    let (name, default) = (c_text(spec.name), c_text(spec.default));
-    engine.cvar_get(&name, &default, engine_flags(spec))
+pub fn get(engine: Engine, spec: &Spec) -> Option<Variable> {
+    let (name, default) = (c_text(spec.name), c_text(default_of(engine, spec)));
+    let flags = if is_owned(engine, spec) {
+        0
+    } else {
+        engine_flags(spec)
+    };
+    engine.cvar_get(&name, &default, flags)
 }
 
 fn register(engine: Engine, spec: &Spec) -> Option<Variable> {
     let variable = get(engine, spec)?;
+    if is_owned(engine, spec) {
+        return Some(variable);
+    }
+    engine.cvar_set_group(variable);
     if let Some(range) = spec.range.filter(|range| range.by_engine) {
         engine.cvar_check_range(variable, range.min, range.max, spec.kind == Kind::Whole);
     }

@@ -1,41 +1,15 @@
 //! The table of functions for the engine.
 
 use super::abi::refexport_t;
-use super::{lifecycle, scene};
+use crate::exports::exports;
+use crate::{lifecycle, scene};
 
 /// Result of every `GetRefAPI`; the engine copies it.
-pub static EXPORTS: refexport_t = refexport_t {
+pub static EXPORTS: refexport_t = exports!(refexport_t {
     Shutdown: lifecycle::shutdown,
     BeginRegistration: lifecycle::begin_registration,
-    RegisterModel: scene::register_model,
-    RegisterSkin: scene::register_skin,
-    RegisterShader: scene::register_shader,
-    RegisterShaderNoMip: scene::register_shader_no_mip,
-    LoadWorld: scene::load_world,
-    SetWorldVisData: scene::set_world_vis_data,
-    EndRegistration: lifecycle::end_registration,
-    ClearScene: scene::clear_scene,
     AddRefEntityToScene: scene::add_ref_entity,
-    AddPolyToScene: scene::add_poly,
-    LightForPoint: scene::light_for_point,
-    AddLightToScene: scene::add_light,
-    AddAdditiveLightToScene: scene::add_additive_light,
-    RenderScene: scene::render_scene,
-    SetColor: scene::set_color,
-    DrawStretchPic: scene::stretch_pic,
-    DrawStretchRaw: scene::stretch_raw,
-    UploadCinematic: scene::upload_cinematic,
-    BeginFrame: lifecycle::begin_frame,
-    EndFrame: lifecycle::end_frame,
-    MarkFragments: scene::mark_fragments,
-    LerpTag: scene::lerp_tag,
-    ModelBounds: scene::model_bounds,
-    RegisterFont: scene::register_font,
-    RemapShader: scene::remap_shader,
-    GetEntityToken: scene::get_entity_token,
-    inPVS: scene::in_pvs,
-    TakeVideoFrame: lifecycle::take_video_frame,
-};
+});
 
 /// Calls every function of the table with invalid arguments.
 ///

@@ -1,93 +1,105 @@
-//! The front end for ioquake3 (Debian's 1.36 and HEAD: one ABI).
-//!
-//! A front end for another engine is a module beside this one, with its own tables and window rules; it shares the
-//! scene structures in [`abi`] and everything outside of this folder, which calls the engine through [`Services`]. Ten
-//! engines pass version 8 to `GetRefAPI`, with seven different tables; [`recognize`] identifies the caller.
+//! The front end for ioquake3: Debian's 1.36, HEAD, and engines whose tables begin with the same entries (World of
+//! Padman).
 
 pub mod abi;
-mod convert;
 mod exports;
-mod fallback;
-mod glconfig;
-mod layout;
-mod lifecycle;
-mod recognize;
-mod scene;
-pub mod services;
 
-pub use exports::EXPORTS;
 #[cfg(test)]
-pub use {
-    exports::call_everything as call_everything_for_tests,
-    lifecycle::shutdown as shutdown_for_tests,
-};
+pub(crate) use exports::call_everything as call_everything_for_tests;
 
-use crate::engine::Services;
-use crate::{logging, session, window};
-use abi::{API_VERSION, refexport_t, refimport_t};
-use services::Ioq3;
-use std::cell::UnsafeCell;
-use std::ffi::c_int;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use crate::cvars;
+use crate::engine::{self, Engine, FrontEnd, Table, renderer_made_window, variable_layout};
+use abi::{cvar_t, refexport_t, refimport_t};
+use exports::EXPORTS;
+use std::ffi::c_void;
 use std::ptr;
 
-/// The table of a substitute renderer, in memory that the engine can read.
-struct Borrowed(UnsafeCell<Option<refexport_t>>);
+/// ioquake3.
+pub(crate) static FRONT_END: FrontEnd = FrontEnd {
+    name: "ioquake3",
+    files: &[],
+    marker: None,
+    recognizes: Some(keeps_descriptions),
+    services: size_of::<refimport_t>() / size_of::<usize>(),
+    called: 35,
+    install,
+    exports: || ptr::from_ref(&EXPORTS).cast(),
+    functions: size_of::<refexport_t>() / size_of::<usize>(),
+    opengl: &["opengl1", "opengl2"],
+    libraries: &["renderer_NAME_ARCH", "renderer_NAME"],
+    folders: &["/usr/lib/ioquake3"],
+    base_game: c"com_basegame",
+    defaults: &[],
+    owned: &[],
+    scripts: &[],
+};
 
-// SAFETY: written and read by `get_ref_api` on the engine's main thread.
-unsafe impl Sync for Borrowed {}
-
-static BORROWED: Borrowed = Borrowed(UnsafeCell::new(None));
-
-/// `GetRefAPI`: resets all state for the engine of `imports` and returns our functions, or null if the engine has
-/// another version of the interface or other tables. Without usable Vulkan it returns the functions of the engine's own
-/// OpenGL renderer.
-///
-/// # Safety
-/// `imports` must be null or point at the import table of an ioquake3 engine, whose functions must be callable until
-/// the process ends. The call must come from the engine's main thread while none of our functions runs.
-pub unsafe fn get_ref_api(api_version: c_int, imports: *const refimport_t) -> *const refexport_t {
-    if imports.is_null() {
-        return ptr::null();
-    }
-    // SAFETY: not null, so it is an engine's table by this function's contract. It lies on the engine's stack, so it is
-    // copied.
-    let table = unsafe { imports.read_unaligned() };
-    // SAFETY: an engine calls this on its main thread, with none of our functions running.
-    let engine = unsafe { Ioq3::install(table) };
-    if api_version != API_VERSION {
-        engine.say(&format!("Relight supports version {API_VERSION} of the renderer interface, this engine has version {api_version}\n"));
-        return ptr::null();
-    }
-    // SAFETY: the table of the engine installed above, which has our version number.
-    if let Some(line) = unsafe { recognize::refusal(engine, imports) } {
-        engine.say(&format!("{line}\n"));
-        return ptr::null();
-    }
-    logging::install();
-    let prepared = catch_unwind(AssertUnwindSafe(|| {
-        session::reset();
-        // A window that an abandoned renderer left open.
-        window::mark_stale();
-        lifecycle::probe(engine)
-    }));
-    let problem = match prepared {
-        Ok(Ok(())) => return &EXPORTS,
-        Ok(Err(problem)) => problem,
-        Err(_) => format!("looking for Vulkan failed{}", logging::take_panic_place()),
+unsafe fn install(imports: *const c_void) -> Engine {
+    // SAFETY: this engine's table by the contract of `FrontEnd::install`. It lies on the engine's stack: it is copied.
+    let from = unsafe { imports.cast::<refimport_t>().read_unaligned() };
+    let table = Table {
+        front_end: Some(&FRONT_END),
+        variable: variable_layout!(cvar_t),
+        cvar_set_description: from.Cvar_SetDescription,
+        ..renderer_made_window!(from)
     };
-    engine.say(&format!("Relight needs Vulkan 1.2: {problem}\n"));
-    // SAFETY: `table` is a copy of the engine's import table, which renderers copy in their turn.
-    match unsafe { fallback::load(engine, api_version, &table) } {
-        Some(exports) => {
-            // SAFETY: main thread; the engine copies the table at once.
-            unsafe {
-                let slot = BORROWED.0.get();
-                *slot = Some(exports);
-                (*slot).as_ref().map_or(ptr::null(), ptr::from_ref)
+    // SAFETY: the contract of `FrontEnd::install` is that of `engine::install`.
+    unsafe { engine::install(table) }
+}
+
+/// Sets a variable's description and tests whether the engine stores it, as engines with ioquake3's tables do. In the
+/// other engines of its family, the same entry of the table only searches a variable of that name, and the member is
+/// another pointer into the engine's memory.
+fn keeps_descriptions(engine: Engine) -> bool {
+    let Some(spec) = renderer_vk::settings::row("r_rt").map(|row| &row.spec) else {
+        return false;
+    };
+    let Some(variable) = cvars::get(engine, spec) else {
+        // without variables there is nothing to compare; such a table is accepted
+        return true;
+    };
+    let text = cvars::c_text(spec.help);
+    engine.cvar_describe(variable, &text);
+    // SAFETY: the engine's own variable; in the other engines of the family, too, it has a member at this offset.
+    let kept = unsafe { (*variable.as_ptr().cast::<cvar_t>()).description }.cast::<u8>();
+    let mut bytes = text.to_bytes_with_nul().iter().enumerate();
+    // SAFETY: bytes are read up to the first difference: in a copy of the text, its zero is the last byte read; in other
+    // engines the pointer is to a variable, which is larger than the matching part.
+    !kept.is_null() && bytes.all(|(i, &byte)| unsafe { *kept.add(i) } == byte)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::abi;
+    use crate::abi::STRUCTURES;
+    use crate::c_tests::{compile, scratch, source};
+    use std::process::Command;
+
+    #[test]
+    fn a_c_compiler_lays_everything_out_the_same() {
+        let folder = scratch("layouts");
+        let program = folder.join("layouts");
+        let Some(()) = compile(
+            &source("ioq3/layouts.c"),
+            &program,
+            &["-std=c99", "-Wall", "-Werror"],
+        ) else {
+            return;
+        };
+        let output = Command::new(&program).output().unwrap();
+        std::fs::remove_dir_all(&folder).unwrap();
+        let theirs = String::from_utf8(output.stdout).unwrap();
+        let mut ours = String::new();
+        for (name, size, fields) in [STRUCTURES, abi::STRUCTURES, abi::TABLES].concat() {
+            ours += &format!("{name} - {size} 0\n");
+            for field in fields {
+                ours += &format!("{name} {} {} {}\n", field.name, field.offset, field.size);
             }
         }
-        // Without any renderer, our functions: `BeginRegistration` reports the missing item and ends the game.
-        None => &EXPORTS,
+        assert!(theirs.lines().count() > 150);
+        for (theirs, ours) in theirs.lines().zip(ours.lines()) {
+            assert_eq!(theirs, ours);
+        }
+        assert_eq!(theirs.lines().count(), ours.lines().count());
     }
 }

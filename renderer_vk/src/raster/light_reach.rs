@@ -66,7 +66,7 @@ mod tests {
             origin: Vec3::new(100.0, 10.0, 0.0),
             radius: 20.0,
             color: Vec3::ONE,
-            additive: false,
+            ..DynamicLight::default()
         };
         // rotated by a quarter turn and scaled by 2: the light is at (5, -50, 0) in instance space
         let instance = Instance {

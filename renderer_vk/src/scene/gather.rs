@@ -169,7 +169,11 @@ impl<'a> Gatherer<'a> {
             },
             polys: &scene.polys,
             poly_vertices: &scene.poly_vertices,
-            lights: if dynamic { &scene.lights } else { &[] },
+            lights: match (dynamic, traced) {
+                (false, _) => &[],
+                (true, false) => &scene.spots,
+                (true, true) => &scene.lights,
+            },
             visible: if view.is_portal {
                 &mut scene.portal_visible
             } else {

@@ -73,7 +73,7 @@ mod tests {
             origin: Vec3::new(x, 0.0, 0.0),
             radius: 200.0,
             color: Vec3::new(1.0, 0.5, 0.0),
-            additive: false,
+            ..DynamicLight::default()
         };
         let directed =
             |x| entity_light(None, false, Vec3::ZERO, &[lamp(x)], &settings).directed - 150.0;
@@ -190,7 +190,7 @@ mod tests {
             origin,
             radius,
             color,
-            additive: false,
+            ..DynamicLight::default()
         };
         let lamps = [
             lamp(Vec3::new(10.0, 20.0, 30.0), 150.0, Vec3::new(1.0, 0.5, 0.1)),

@@ -244,7 +244,10 @@ const DYNAMIC_LIGHT_CLEARANCE: f32 = 20.0;
 /// Radius of the glowing gas, as a part of the light's reach.
 const DYNAMIC_LIGHT_CORE: f32 = 0.35;
 
-/// The game's dynamic lights as small spheres.
+/// Length of the parts of a light along a line, as a part of its reach.
+const DYNAMIC_LIGHT_STEP: f32 = 0.5;
+
+/// The game's dynamic lights as small spheres; a light along a line as a row of them.
 ///
 /// The engine gives a light a reach `r` and a colour; its classic look adds about the whole colour up to half the reach
 /// and fades to nothing at `r`. Here light falls off with the square of the distance, strong enough that a white
@@ -257,6 +260,10 @@ const DYNAMIC_LIGHT_CORE: f32 = 0.35;
 /// it. Therefore light is constant within 0.35 of the reach: twice the light's colour. The classic look multiplies the
 /// displayed colour by up to one more than the light's colour: dark walls at a muzzle flash get less light there than
 /// here, lit floors more.
+///
+/// A line of length L and total intensity I gives a surface that faces its middle at distance h the irradiance
+/// I / (h sqrt(h² + L²/4)), the integral of cos / d² along it. So that it also shows the light's colour at half the
+/// reach, its intensity is that of a light at a point times sqrt(1 + (L / 2h)²).
 pub fn dynamic_lights(lights: &[DynamicLight], scale: f32) -> Vec<t::SphereLight> {
     lights
         .iter()
@@ -264,23 +271,27 @@ pub fn dynamic_lights(lights: &[DynamicLight], scale: f32) -> Vec<t::SphereLight
             light.radius > 0.0
                 && light.radius.is_finite()
                 && light.origin.is_finite()
+                && light.end.is_none_or(Vec3::is_finite)
                 && light.color.is_finite()
         })
-        .map(|light| {
+        .flat_map(|light| {
             let half = light.radius * 0.5;
             let color = decode(light.color.max(Vec3::ZERO));
             let (part, min, max) = DYNAMIC_LIGHT_SIZE;
             let radius = (light.radius * part).clamp(min, max);
-            let strength = (PI * half * half * scale).min(STRONGEST);
-            t::SphereLight {
-                core: light.radius * DYNAMIC_LIGHT_CORE,
+            let places = light.places(DYNAMIC_LIGHT_STEP);
+            let line = (1.0 + (light.length() / light.radius).powi(2)).sqrt() / places.len() as f32;
+            let strength = (PI * half * half * scale * line).min(STRONGEST);
+            let core = light.radius * DYNAMIC_LIGHT_CORE;
+            places.map(move |place| t::SphereLight {
+                core,
                 ..sphere(
-                    light.origin,
+                    place,
                     radius,
                     (color * strength).min(Vec3::splat(STRONGEST)),
                     DYNAMIC_LIGHT_CLEARANCE,
                 )
-            }
+            })
         })
         .collect()
 }
@@ -350,6 +361,33 @@ mod tests {
             let strength = light.radiance;
             assert!(strength.length_squared().is_finite(), "{strength}");
             assert!(strength.x > 0.0, "{strength}");
+        }
+    }
+
+    #[test]
+    fn a_light_along_a_line_shows_its_colour_at_half_its_reach() {
+        for length in [0.0, 30.0, 200.0, 700.0] {
+            let light = DynamicLight {
+                radius: 100.0,
+                color: Vec3::ONE,
+                end: Some(Vec3::X * length),
+                ..DynamicLight::default()
+            };
+            let row = dynamic_lights(&[light], 1.0);
+            assert_eq!(row.len(), ((length / 50.0).ceil() as usize).clamp(1, 16));
+            let receiver = Vec3::new(length * 0.5, 50.0, 0.0);
+            let irradiance: f32 = row
+                .iter()
+                .map(|part| {
+                    let to = part.origin - receiver;
+                    let area = PI * part.radius * part.radius;
+                    part.radiance.x * area * 50.0 / to.length().powi(3)
+                })
+                .sum();
+            assert!(
+                (irradiance / PI - 1.0).abs() < 0.04,
+                "{length}: {irradiance}"
+            );
         }
     }
 }

@@ -212,6 +212,11 @@ impl Cvars {
         self.variables.values_mut().find(|v| ptr::eq(v.live, live))
     }
 
+    /// Whether a pointer is to one of the variables.
+    pub fn has(&mut self, live: *mut cvar_t) -> bool {
+        self.by_pointer(live).is_some()
+    }
+
     /// `Cvar_CheckRange`. False for a pointer that is none of ours.
     pub fn check_range(&mut self, live: *mut cvar_t, min: f32, max: f32, integral: bool) -> bool {
         let Some(variable) = self.by_pointer(live) else {

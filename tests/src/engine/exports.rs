@@ -60,7 +60,7 @@ impl View {
         let text = self.text.map(|line| {
             let mut place = [0; 32];
             for (to, from) in place.iter_mut().take(31).zip(line.bytes()) {
-                *to = from as c_char;
+                *to = from;
             }
             place
         });
@@ -176,8 +176,8 @@ impl Engine {
         let (p, a) = (&raw mut point, &raw mut answer);
         // SAFETY: four places for three numbers each.
         let found = call(move || unsafe {
-            let a = a.cast::<f32>();
-            (re.LightForPoint)(p.cast(), a, a.add(3), a.add(6))
+            let a = a.cast::<[f32; 3]>();
+            (re.LightForPoint)(p, a, a.add(1), a.add(2))
         })?;
         Ok((found != 0).then_some(answer.map(Vec3::from)))
     }
@@ -187,9 +187,7 @@ impl Engine {
         let place = origin.to_array();
         let place = &raw const place;
         // SAFETY: as in `register_model`.
-        call(move || unsafe {
-            (re.AddLightToScene)(place.cast(), radius, color.x, color.y, color.z)
-        })
+        call(move || unsafe { (re.AddLightToScene)(place, radius, color.x, color.y, color.z) })
     }
 
     pub fn add_additive_light(
@@ -203,8 +201,63 @@ impl Engine {
         let place = &raw const place;
         // SAFETY: as in `register_model`.
         call(move || unsafe {
-            (re.AddAdditiveLightToScene)(place.cast(), radius, color.x, color.y, color.z)
+            (re.AddAdditiveLightToScene)(place, radius, color.x, color.y, color.z)
         })
+    }
+
+    /// Quake3e's: an entity whose `shaderTime` is in milliseconds.
+    pub fn add_entity_in_milliseconds(
+        &mut self,
+        entity: &refEntity_t,
+        milliseconds: i32,
+    ) -> Result<(), Raised> {
+        let entity = refEntity_t {
+            shaderTime: f32::from_bits(milliseconds.cast_unsigned()),
+            ..*entity
+        };
+        let (re, entity) = (self.quake3e(), &raw const entity);
+        // SAFETY: as in `register_model`.
+        call(move || unsafe { (re.AddRefEntityToScene)(entity, 1) })
+    }
+
+    /// Quake3e's.
+    pub fn add_linear_light(
+        &mut self,
+        ends: [Vec3; 2],
+        radius: f32,
+        color: Vec3,
+    ) -> Result<(), Raised> {
+        let re = self.quake3e();
+        let ends = ends.map(|end| end.to_array());
+        let start = ends.as_ptr();
+        // SAFETY: two places of three numbers.
+        call(move || unsafe {
+            (re.AddLinearLightToScene)(start, start.add(1), radius, color.x, color.y, color.z)
+        })
+    }
+
+    /// Quake3e's: the next frame need not be shown.
+    pub fn throttle(&mut self) -> Result<(), Raised> {
+        let re = self.quake3e();
+        // SAFETY: as in `register_model`.
+        call(move || unsafe { (re.ThrottleBackend)() })
+    }
+
+    /// Quake3e's: width and height of the configuration that the renderer keeps.
+    pub fn kept_size(&mut self) -> Result<(i32, i32), Raised> {
+        let re = self.quake3e();
+        // SAFETY: as in `register_model`; the structure is valid until the process ends.
+        call(move || unsafe {
+            let config = (re.GetConfig)();
+            ((*config).vidWidth, (*config).vidHeight)
+        })
+    }
+
+    /// Quake3e's: whether what is registered next may be lit by vertices.
+    pub fn vertex_lighting(&mut self, allowed: bool) -> Result<(), Raised> {
+        let re = self.quake3e();
+        // SAFETY: as in `register_model`.
+        call(move || unsafe { (re.VertexLighting)(allowed.into()) })
     }
 
     pub fn render_scene(&mut self, view: &View) -> Result<(), Raised> {
@@ -216,7 +269,7 @@ impl Engine {
 
     pub fn set_color(&mut self, color: Option<[f32; 4]>) -> Result<(), Raised> {
         let re = self.exports();
-        let color = color.as_ref().map_or(std::ptr::null(), |c| c.as_ptr());
+        let color = color.as_ref().map_or(std::ptr::null(), |c| &raw const *c);
         // SAFETY: NULL or four numbers.
         call(move || unsafe { (re.SetColor)(color) })
     }
@@ -305,13 +358,13 @@ impl Engine {
         let mut fragments = vec![guard; max_fragments + 1];
         let (count, input, direction) =
             (input.len() as c_int, input.as_ptr(), &raw const direction);
-        let (out, found) = (buffer.as_mut_ptr().cast::<f32>(), fragments.as_mut_ptr());
+        let (out, found) = (buffer.as_mut_ptr(), fragments.as_mut_ptr());
         // SAFETY: buffers of the sizes that are passed, and one more each.
         let n = call(move || unsafe {
             (re.MarkFragments)(
                 count,
                 input,
-                direction.cast(),
+                direction,
                 max_points as c_int,
                 out,
                 max_fragments as c_int,
@@ -351,7 +404,7 @@ impl Engine {
             numPoints: 0,
         }; 128];
         let (input, direction) = (corners.as_ptr(), &raw const direction);
-        let (out, found) = (points.as_mut_ptr().cast::<f32>(), fragments.as_mut_ptr());
+        let (out, found) = (points.as_mut_ptr(), fragments.as_mut_ptr());
         // SAFETY: buffers of the sizes that are passed.
         call(move || unsafe {
             (re.MarkFragments)(4, input, direction.cast(), 384, out, 128, found)
@@ -387,9 +440,9 @@ impl Engine {
     pub fn model_bounds(&mut self, model: i32) -> Result<(Vec3, Vec3), Raised> {
         let re = self.exports();
         let mut bounds = [[f32::NAN; 3]; 2];
-        let place = (&raw mut bounds).cast::<f32>();
+        let place = (&raw mut bounds).cast::<[f32; 3]>();
         // SAFETY: two places for three numbers.
-        call(move || unsafe { (re.ModelBounds)(model, place, place.add(3)) })?;
+        call(move || unsafe { (re.ModelBounds)(model, place, place.add(1)) })?;
         Ok((bounds[0].into(), bounds[1].into()))
     }
 
@@ -435,7 +488,7 @@ impl Engine {
         let (a, b) = (a.to_array(), b.to_array());
         let (a, b) = (&raw const a, &raw const b);
         // SAFETY: two places.
-        Ok(call(move || unsafe { (re.inPVS)(a.cast(), b.cast()) })? != 0)
+        Ok(call(move || unsafe { (re.inPVS)(a, b) })? != 0)
     }
 
     /// Queues a frame for the video writer; it comes with the next `EndFrame`.

@@ -1,4 +1,4 @@
-//! The forty services that the stand-in offers to the renderer, over one state for each thread.
+//! The services that the stand-in offers to the renderer, over one state for each thread.
 //!
 //! No service keeps the state borrowed while it calls the renderer, since the renderer calls back.
 
@@ -10,7 +10,7 @@ use std::ptr;
 use std::rc::Rc;
 use std::time::Instant;
 
-use super::abi::{ERR_FATAL, cvar_t, glconfig_t, refexport_t, refimport_t};
+use super::abi::{ERR_FATAL, cvar_t, glconfig_t, openarena, quake3e, refexport_t, refimport_t};
 use super::cvars::Cvars;
 use super::files::Files;
 use super::memory::Memory;
@@ -52,8 +52,30 @@ pub enum Tables {
     WorldOfPadman,
     /// 39: without `Cvar_SetDescription`, and variables without a description.
     OpenArena,
-    /// 56, most of them elsewhere.
+    /// 56, most of them elsewhere, some for a window that the engine makes.
     Quake3e,
+    /// The same with numbers in place of the last services.
+    Quake3eCutOff,
+}
+
+impl Tables {
+    /// The variable `version`.
+    pub(super) fn version(self) -> &'static str {
+        match self {
+            Tables::Ioquake3 => "ioq3 1.36",
+            Tables::WorldOfPadman => "wop 1.36",
+            Tables::OpenArena => "OpenArena 0.8.8 oa2020",
+            Tables::Quake3e | Tables::Quake3eCutOff => "Q3 1.32e",
+        }
+    }
+
+    /// What `Shutdown` gets when the window is to be closed.
+    pub(super) fn close_code(self) -> c_int {
+        match self {
+            Tables::Quake3e | Tables::Quake3eCutOff => 2,
+            _ => 1,
+        }
+    }
 }
 
 /// A picture of a film.
@@ -76,11 +98,14 @@ impl Default for Film {
 
 /// State of the engine side.
 pub(super) struct State {
+    pub tables: Tables,
     pub exports: Option<refexport_t>,
+    /// The functions that only this engine's renderers have.
+    pub quake3e: Option<quake3e::refexport_t>,
     /// Where `BeginRegistration` writes; the real engine keeps one such structure for good.
     pub config: Box<glconfig_t>,
     pub cvars: Cvars,
-    pub commands: HashMap<String, extern "C" fn()>,
+    pub commands: HashMap<String, unsafe extern "C" fn()>,
     pub arguments: Vec<CString>,
     pub buffer: VecDeque<String>,
     pub files: Files,
@@ -106,6 +131,8 @@ pub(super) struct State {
     /// What each of them shows.
     pub film: Film,
     pub windows: Vec<usize>,
+    /// What happened to the window that the engine makes, and to what depends on it.
+    pub window_events: Vec<String>,
 }
 
 thread_local! {
@@ -123,7 +150,7 @@ pub(super) fn with<R>(f: impl FnOnce(&mut State) -> R) -> Option<R> {
 }
 
 /// The C string as text, empty for NULL.
-fn text(pointer: *const c_char) -> String {
+pub(super) fn text(pointer: *const c_char) -> String {
     if pointer.is_null() {
         return String::new();
     }
@@ -161,8 +188,8 @@ extern "C" fn stand_in_print(level: c_int, message: *const c_char) {
 #[unsafe(no_mangle)]
 extern "C" fn stand_in_error(level: c_int, message: *const c_char) {
     let message = text(message);
-    let Some((exports, registered, handling)) = with(|s| {
-        let before = (s.exports, s.registered, s.handling);
+    let Some((exports, registered, handling, close)) = with(|s| {
+        let before = (s.exports, s.registered, s.handling, s.tables.close_code());
         s.raised = Some((level, message.clone()));
         if s.handling {
             s.memory.violations.push(format!(
@@ -182,7 +209,7 @@ extern "C" fn stand_in_error(level: c_int, message: *const c_char) {
     if let Some(exports) = exports {
         if level == ERR_FATAL {
             // SAFETY: the library is loaded, and this is its thread.
-            let _ = super::call(move || unsafe { (exports.Shutdown)(1) });
+            let _ = super::call(move || unsafe { (exports.Shutdown)(close) });
         } else {
             // SAFETY: as above.
             let _ = super::call(move || unsafe { (exports.Shutdown)(0) });
@@ -203,12 +230,12 @@ extern "C" fn milliseconds() -> c_int {
     .unwrap_or(0)
 }
 
-extern "C" fn hunk_alloc(bytes: c_int, _preference: c_int) -> *mut c_void {
+pub(super) extern "C" fn hunk_alloc(bytes: c_int, _preference: c_int) -> *mut c_void {
     let bytes = size(bytes);
     with(|s| s.memory.hunk(bytes)).unwrap_or(ptr::null_mut())
 }
 
-extern "C" fn hunk_allocate_temporary(bytes: c_int) -> *mut c_void {
+pub(super) extern "C" fn hunk_allocate_temporary(bytes: c_int) -> *mut c_void {
     let bytes = size(bytes);
     with(|s| s.memory.push_temporary(bytes)).unwrap_or(ptr::null_mut())
 }
@@ -217,7 +244,7 @@ extern "C" fn hunk_free_temporary(block: *mut c_void) {
     with(|s| s.memory.pop_temporary(block));
 }
 
-extern "C" fn zone_malloc(bytes: c_int) -> *mut c_void {
+pub(super) extern "C" fn zone_malloc(bytes: c_int) -> *mut c_void {
     let bytes = size(bytes);
     with(|s| s.memory.zone(bytes)).unwrap_or(ptr::null_mut())
 }
@@ -226,9 +253,11 @@ extern "C" fn zone_free(block: *mut c_void) {
     with(|s| s.memory.free_zone(block));
 }
 
-extern "C" fn cvar_get(name: *const c_char, value: *const c_char, flags: c_int) -> *mut cvar_t {
+extern "C" fn cvar_get(name: *const c_char, value: *const c_char, flags: c_int) -> *mut c_void {
     let (name, value) = (text(name), text(value));
-    with(|s| s.cvars.get(&name, &value, flags)).unwrap_or(ptr::null_mut())
+    with(|s| s.cvars.get(&name, &value, flags))
+        .unwrap_or(ptr::null_mut())
+        .cast()
 }
 
 extern "C" fn cvar_set(name: *const c_char, value: *const c_char) {
@@ -241,13 +270,15 @@ extern "C" fn cvar_set_value(name: *const c_char, value: f32) {
     with(|s| s.cvars.force(&name, &value.to_string()));
 }
 
-extern "C" fn cvar_check_range(cvar: *mut cvar_t, min: f32, max: f32, integral: c_int) {
+pub(super) extern "C" fn cvar_check_range(cvar: *mut c_void, min: f32, max: f32, integral: c_int) {
+    let cvar = cvar.cast::<cvar_t>();
     if min > max || with(|s| s.cvars.check_range(cvar, min, max, integral != 0)) == Some(false) {
         violation(format!("Cvar_CheckRange({cvar:?}, {min}, {max})"));
     }
 }
 
-extern "C" fn cvar_set_description(cvar: *mut cvar_t, description: *const c_char) {
+extern "C" fn cvar_set_description(cvar: *mut c_void, description: *const c_char) {
+    let cvar = cvar.cast::<cvar_t>();
     let description = text(description);
     if with(|s| s.cvars.set_description(cvar, &description)) == Some(false) {
         violation(format!("Cvar_SetDescription({cvar:?}, {description:?})"));
@@ -259,7 +290,7 @@ extern "C" fn cvar_variable_integer_value(name: *const c_char) -> c_int {
     with(|s| s.cvars.integer(&name)).unwrap_or(0)
 }
 
-extern "C" fn cmd_add_command(name: *const c_char, command: Option<extern "C" fn()>) {
+extern "C" fn cmd_add_command(name: *const c_char, command: Option<unsafe extern "C" fn()>) {
     let name = text(name).to_ascii_lowercase();
     let Some(command) = command else { return };
     let added = with(|s| match s.commands.entry(name.clone()) {
@@ -300,7 +331,8 @@ extern "C" fn cmd_execute_text(when: c_int, command: *const c_char) {
             let found = super::prepare(&command);
             drop(command);
             if let Some(found) = found {
-                found();
+                // SAFETY: a command of the renderer, whose library is loaded.
+                unsafe { found() };
             }
         }
         1 => _ = with(|s| s.buffer.push_front(command)),
@@ -320,7 +352,7 @@ extern "C" fn cm_cluster_pvs(cluster: c_int) -> *mut c_uchar {
 }
 
 /// Collision code that wants to see a red square 50 units before [`crate::maps::HERE`], facing it.
-extern "C" fn cm_draw_debug_surface(draw: Option<extern "C" fn(c_int, c_int, *mut f32)>) {
+extern "C" fn cm_draw_debug_surface(draw: Option<unsafe extern "C" fn(c_int, c_int, *mut f32)>) {
     let corner = |side: f32, up: f32| {
         let place = crate::maps::HERE + glam::Vec3::new(50.0, side, up);
         place.to_array()
@@ -332,7 +364,8 @@ extern "C" fn cm_draw_debug_surface(draw: Option<extern "C" fn(c_int, c_int, *mu
         corner(10.0, -10.0),
     ];
     if let Some(draw) = draw {
-        draw(1, 4, corners.as_mut_ptr().cast());
+        // SAFETY: four corners.
+        unsafe { draw(1, 4, corners.as_mut_ptr().cast()) };
     }
 }
 
@@ -346,7 +379,7 @@ extern "C" fn fs_file_is_in_pak(name: *const c_char, checksum: *mut c_int) -> c_
     if found { 1 } else { -1 }
 }
 
-extern "C" fn fs_read_file(name: *const c_char, buffer: *mut *mut c_void) -> c_long {
+pub(super) extern "C" fn fs_read_file(name: *const c_char, buffer: *mut *mut c_void) -> c_long {
     let name = text(name);
     if name.is_empty() || name.len() >= 64 {
         // An empty name ends a real process; a long one is cut.
@@ -505,83 +538,141 @@ extern "C" fn low_physical_memory() -> c_int {
     0
 }
 
-/// A service of another engine's table where the renderer takes it for one of ioquake3's: ends the process, as the real
-/// one would.
+/// A service that a renderer of this table must not call: ends the process.
 extern "C" fn wrong_service() {
     panic!("a service of an unknown table was called");
 }
 
-/// The words of the table that `GetRefAPI` gets, with zeros behind them.
-pub(super) fn words(tables: Tables) -> [usize; 64] {
-    const SERVICES: usize = size_of::<refimport_t>() / size_of::<usize>();
-    // SAFETY: a structure of function pointers alone.
-    let ours = unsafe { std::mem::transmute::<refimport_t, [usize; SERVICES]>(table()) };
-    let wrong = (wrong_service as *const ()).expose_provenance();
+/// The words of a table.
+fn words_of<T, const N: usize>(table: T) -> [usize; 64] {
+    const { assert!(size_of::<T>() == N * size_of::<usize>() && N <= 64) };
     let mut words = [0; 64];
-    let (print_and_error, rest) = ours.split_at(2);
-    match tables {
-        Tables::Ioquake3 => words[..SERVICES].copy_from_slice(&ours),
-        Tables::WorldOfPadman => {
-            words[..SERVICES].copy_from_slice(&ours);
-            words[SERVICES..SERVICES + 4].fill(wrong);
-        }
-        Tables::OpenArena => {
-            // up to Cvar_CheckRange the same; the next is Cvar_VariableIntegerValue
-            words[..12].copy_from_slice(&ours[..12]);
-            words[12..SERVICES - 1].fill(wrong);
-            words[12] = ours[13];
-        }
-        Tables::Quake3e => {
-            words[..2].copy_from_slice(print_and_error);
-            words[2] = rest[0];
-            words[3..56].fill(wrong);
-        }
-    }
+    // SAFETY: a structure of optional function pointers alone, as large as `N` words.
+    unsafe { ptr::copy_nonoverlapping((&raw const table).cast(), words.as_mut_ptr(), N) };
     words
 }
 
-/// The table of ioquake3.
-fn table() -> refimport_t {
-    refimport_t {
-        Printf: stand_in_printf,
-        Error: stand_in_raise,
-        Milliseconds: milliseconds,
-        Hunk_Alloc: hunk_alloc,
-        Hunk_AllocateTempMemory: hunk_allocate_temporary,
-        Hunk_FreeTempMemory: hunk_free_temporary,
-        Malloc: zone_malloc,
-        Free: zone_free,
-        Cvar_Get: cvar_get,
-        Cvar_Set: cvar_set,
-        Cvar_SetValue: cvar_set_value,
-        Cvar_CheckRange: cvar_check_range,
-        Cvar_SetDescription: cvar_set_description,
-        Cvar_VariableIntegerValue: cvar_variable_integer_value,
-        Cmd_AddCommand: cmd_add_command,
-        Cmd_RemoveCommand: cmd_remove_command,
-        Cmd_Argc: cmd_argc,
-        Cmd_Argv: cmd_argv,
-        Cmd_ExecuteText: cmd_execute_text,
-        CM_ClusterPVS: cm_cluster_pvs,
-        CM_DrawDebugSurface: cm_draw_debug_surface,
-        FS_FileIsInPAK: fs_file_is_in_pak,
-        FS_ReadFile: fs_read_file,
-        FS_FreeFile: fs_free_file,
-        FS_ListFiles: fs_list_files,
-        FS_FreeFileList: fs_free_file_list,
-        FS_WriteFile: fs_write_file,
-        FS_FileExists: fs_file_exists,
-        CIN_UploadCinematic: cin_upload,
-        CIN_PlayCinematic: cin_play,
-        CIN_RunCinematic: cin_run,
-        CL_WriteAVIVideoFrame: write_video_frame,
-        IN_Init: input_init,
-        IN_Shutdown: nothing,
-        IN_Restart: nothing,
-        ftol,
-        Sys_SetEnv: set_environment,
-        Sys_GLimpSafeInit: nothing,
-        Sys_GLimpInit: nothing,
-        Sys_LowPhysicalMemory: low_physical_memory,
+/// The words of the table that `GetRefAPI` gets, with zeros behind them.
+pub(super) fn words(tables: Tables) -> [usize; 64] {
+    let wrong = (wrong_service as *const ()).expose_provenance();
+    match tables {
+        Tables::Ioquake3 => words_of::<_, 40>(ioquake3_table()),
+        Tables::WorldOfPadman => {
+            let mut words = words_of::<_, 40>(ioquake3_table());
+            words[40..44].fill(wrong);
+            words
+        }
+        Tables::OpenArena => words_of::<_, 39>(openarena_table()),
+        Tables::Quake3e => words_of::<_, 56>(quake3e_table()),
+        Tables::Quake3eCutOff => {
+            let mut words = words_of::<_, 56>(quake3e_table());
+            words[50..56].fill(1);
+            words
+        }
     }
+}
+
+/// A table with the services that the engines have in common, and others.
+macro_rules! table {
+    ($table:ident { $($field:ident: $function:expr),* $(,)? }) => {
+        $table {
+            $($field: Some($function),)*
+            Printf: Some(stand_in_printf),
+            Error: Some(stand_in_raise),
+            Milliseconds: Some(milliseconds),
+            Hunk_FreeTempMemory: Some(hunk_free_temporary),
+            Free: Some(zone_free),
+            Cvar_Get: Some(cvar_get),
+            Cvar_Set: Some(cvar_set),
+            Cvar_SetValue: Some(cvar_set_value),
+            Cvar_VariableIntegerValue: Some(cvar_variable_integer_value),
+            Cmd_AddCommand: Some(cmd_add_command),
+            Cmd_RemoveCommand: Some(cmd_remove_command),
+            Cmd_Argc: Some(cmd_argc),
+            Cmd_Argv: Some(cmd_argv),
+            Cmd_ExecuteText: Some(cmd_execute_text),
+            CM_ClusterPVS: Some(cm_cluster_pvs),
+            CM_DrawDebugSurface: Some(cm_draw_debug_surface),
+            FS_FreeFile: Some(fs_free_file),
+            FS_ListFiles: Some(fs_list_files),
+            FS_FreeFileList: Some(fs_free_file_list),
+            FS_WriteFile: Some(fs_write_file),
+            FS_FileExists: Some(fs_file_exists),
+            CIN_UploadCinematic: Some(cin_upload),
+            CIN_PlayCinematic: Some(cin_play),
+            CIN_RunCinematic: Some(cin_run),
+            CL_WriteAVIVideoFrame: Some(write_video_frame),
+            Sys_LowPhysicalMemory: Some(low_physical_memory),
+        }
+    };
+}
+
+/// [`table`] with what engines have whose renderer makes the window.
+macro_rules! renderer_made_window {
+    ($table:ident { $($field:ident: $function:expr),* $(,)? }) => {
+        table!($table {
+            $($field: $function,)*
+            Hunk_Alloc: hunk_alloc,
+            Hunk_AllocateTempMemory: hunk_allocate_temporary,
+            Malloc: zone_malloc,
+            Cvar_CheckRange: cvar_check_range,
+            FS_FileIsInPAK: fs_file_is_in_pak,
+            FS_ReadFile: fs_read_file,
+            IN_Init: input_init,
+            IN_Shutdown: nothing,
+            IN_Restart: nothing,
+            ftol: ftol,
+            Sys_SetEnv: set_environment,
+            Sys_GLimpSafeInit: nothing,
+            Sys_GLimpInit: nothing,
+        })
+    };
+}
+
+fn ioquake3_table() -> refimport_t {
+    renderer_made_window!(refimport_t {
+        Cvar_SetDescription: cvar_set_description
+    })
+}
+
+fn openarena_table() -> openarena::refimport_t {
+    use openarena::refimport_t;
+    renderer_made_window!(refimport_t {})
+}
+
+fn quake3e_table() -> quake3e::refimport_t {
+    use super::quake3e as own;
+    use quake3e::refimport_t;
+    table!(refimport_t {
+        Microseconds: own::microseconds,
+        Hunk_Alloc: own::hunk_alloc,
+        Hunk_AllocateTempMemory: own::hunk_allocate_temporary,
+        Malloc: own::zone_malloc,
+        FreeAll: own::free_all,
+        Cvar_CheckRange: own::cvar_check_range,
+        Cvar_SetDescription: cvar_set_description,
+        Cvar_SetGroup: own::cvar_set_group,
+        Cvar_CheckGroup: own::cvar_check_group,
+        Cvar_ResetGroup: own::cvar_reset_group,
+        Cvar_VariableStringBuffer: own::cvar_variable_string_buffer,
+        Cvar_VariableString: own::cvar_variable_string,
+        FS_ReadFile: own::fs_read_file,
+        CL_SaveJPGToBuffer: own::save_jpeg_to_buffer,
+        CL_SaveJPG: own::save_jpeg,
+        CL_LoadJPG: own::load_jpeg,
+        CL_IsMinimized: own::is_minimized,
+        CL_SetScaling: own::set_scaling,
+        Sys_SetClipboardBitmap: own::set_clipboard,
+        Com_RealTime: own::real_time,
+        GLimp_InitGamma: own::opengl_config,
+        GLimp_SetGamma: own::set_gamma,
+        GLimp_Init: own::opengl_config,
+        GLimp_Shutdown: own::opengl_shutdown,
+        GLimp_EndFrame: own::opengl_end_frame,
+        GL_GetProcAddress: own::opengl_function,
+        VKimp_Init: own::open_window,
+        VKimp_Shutdown: own::close_window,
+        VK_GetInstanceProcAddr: own::instance_function,
+        VK_CreateSurface: own::create_surface,
+    })
 }

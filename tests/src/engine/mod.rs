@@ -1,7 +1,8 @@
 //! A stand-in for the engine: it loads the renderer library, offers it the engine's services and drives it through
 //! the life of a game, in a process that a test can look into.
 //!
-//! It behaves as Debian's ioquake3 does towards a renderer: console variables are live structures, temporary
+//! It has the tables of each supported engine ([`Tables`]). Towards a renderer it behaves as Debian's ioquake3 does:
+//! console variables are live structures, temporary
 //! memory is a stack, the hunk is thrown away whole, an error leaves the renderer by `longjmp` after it has been shut
 //! down and registered anew from inside the call that raised it, the library is unloaded and loaded again by a video
 //! restart. It is stricter where the real one would corrupt itself silently: see [`Engine::violations`].
@@ -13,18 +14,19 @@ mod exports;
 pub mod files;
 mod imports;
 pub mod memory;
+mod quake3e;
 
 use std::ffi::{CString, c_void};
 use std::mem::MaybeUninit;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 
 use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
 use tempfile::TempDir;
 use thiserror::Error;
 
-use abi::{GetRefAPI, REF_API_VERSION, glconfig_t, refexport_t};
+use abi::{GetRefAPI, REF_API_VERSION, glconfig_t, openarena, refEntity_t, refexport_t};
 pub use exports::View;
 use files::{Files, Packs};
 use imports::{Film, State};
@@ -143,6 +145,100 @@ fn call<R: Copy>(f: impl FnOnce() -> R + Copy) -> Result<R, Raised> {
     Err(Raised { level, message })
 }
 
+/// The functions of a renderer for another engine as those of one for ioquake3.
+macro_rules! as_ioquake3 {
+    ($from:expr, $add_entity:expr) => {
+        refexport_t {
+            AddRefEntityToScene: $add_entity,
+            Shutdown: $from.Shutdown,
+            BeginRegistration: $from.BeginRegistration,
+            RegisterModel: $from.RegisterModel,
+            RegisterSkin: $from.RegisterSkin,
+            RegisterShader: $from.RegisterShader,
+            RegisterShaderNoMip: $from.RegisterShaderNoMip,
+            LoadWorld: $from.LoadWorld,
+            SetWorldVisData: $from.SetWorldVisData,
+            EndRegistration: $from.EndRegistration,
+            ClearScene: $from.ClearScene,
+            AddPolyToScene: $from.AddPolyToScene,
+            LightForPoint: $from.LightForPoint,
+            AddLightToScene: $from.AddLightToScene,
+            AddAdditiveLightToScene: $from.AddAdditiveLightToScene,
+            RenderScene: $from.RenderScene,
+            SetColor: $from.SetColor,
+            DrawStretchPic: $from.DrawStretchPic,
+            DrawStretchRaw: $from.DrawStretchRaw,
+            UploadCinematic: $from.UploadCinematic,
+            BeginFrame: $from.BeginFrame,
+            EndFrame: $from.EndFrame,
+            MarkFragments: $from.MarkFragments,
+            LerpTag: $from.LerpTag,
+            ModelBounds: $from.ModelBounds,
+            RegisterFont: $from.RegisterFont,
+            RemapShader: $from.RemapShader,
+            GetEntityToken: $from.GetEntityToken,
+            inPVS: $from.inPVS,
+            TakeVideoFrame: $from.TakeVideoFrame,
+        }
+    };
+}
+
+/// `AddRefEntityToScene` of Quake3e with a `shaderTime` in seconds.
+///
+/// # Safety
+/// That of the renderer's function.
+unsafe extern "C" fn add_entity_in_seconds(entity: *const refEntity_t) {
+    let add = imports::with(|s| s.quake3e.map(|re| re.AddRefEntityToScene)).flatten();
+    if let Some(add) = add {
+        // SAFETY: the caller's promise.
+        unsafe { add(entity, 0) }
+    }
+}
+
+/// Keeps the table that `GetRefAPI` returned.
+///
+/// # Safety
+/// The pointer must be to the table of a renderer for this engine.
+unsafe fn keep_exports(tables: Tables, exports: *const c_void) {
+    let (exports, quake3e) = match tables {
+        Tables::Ioquake3 | Tables::WorldOfPadman => {
+            // SAFETY: a table of this type, by the caller's promise.
+            (unsafe { exports.cast::<refexport_t>().read() }, None)
+        }
+        Tables::OpenArena => {
+            // SAFETY: as above.
+            let re = unsafe { exports.cast::<openarena::refexport_t>().read() };
+            (as_ioquake3!(re, re.AddRefEntityToScene), None)
+        }
+        Tables::Quake3e | Tables::Quake3eCutOff => {
+            // SAFETY: as above.
+            let re = unsafe { exports.cast::<abi::quake3e::refexport_t>().read() };
+            (as_ioquake3!(re, add_entity_in_seconds), Some(re))
+        }
+    };
+    imports::with(|s| {
+        s.exports = Some(exports);
+        s.quake3e = quake3e;
+    });
+}
+
+/// The library under the file name that this engine loads.
+fn library_of(tables: Tables) -> PathBuf {
+    static COPY: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
+    let library = crate::data::library();
+    if tables != Tables::Quake3e {
+        return library;
+    }
+    // A copy, because the same file under another name would be the library that is loaded already.
+    let (_, copy) = COPY.get_or_init(|| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let copy = folder.path().join("quake3e_vk_x86_64.so");
+        std::fs::copy(&library, &copy).expect("a copy of the library");
+        (folder, copy)
+    });
+    copy.clone()
+}
+
 /// `BeginRegistration` and what the engine registers right after it.
 fn begin_registration(exports: refexport_t) -> Result<(), Raised> {
     let Some(config) = imports::with(|s| &raw mut *s.config) else {
@@ -162,7 +258,7 @@ fn begin_registration(exports: refexport_t) -> Result<(), Raised> {
 }
 
 /// Finds what a console command of the renderer's runs and sets its arguments; `set` is done at once.
-fn prepare(text: &str) -> Option<extern "C" fn()> {
+fn prepare(text: &str) -> Option<unsafe extern "C" fn()> {
     let words: Vec<&str> = text.split_whitespace().collect();
     match words.as_slice() {
         [] => None,
@@ -188,7 +284,7 @@ fn prepare(text: &str) -> Option<extern "C" fn()> {
 impl Engine {
     /// Starts an engine with the library that cargo built, without a window, up to where menus are drawn.
     pub fn start(options: Options) -> Result<Self, LoadError> {
-        Self::start_with(&crate::data::library(), options)
+        Self::start_with(&library_of(options.tables), options)
     }
 
     /// The same with another library.
@@ -210,6 +306,11 @@ impl Engine {
         Ok(engine)
     }
 
+    /// Loads the library under the file name that its engine loads; nothing is registered yet.
+    pub fn load_named(options: Options) -> Result<Self, LoadError> {
+        Self::load(&library_of(options.tables), options)
+    }
+
     /// Loads the library and calls `GetRefAPI`; nothing is registered yet.
     pub fn load(library: &Path, options: Options) -> Result<Self, LoadError> {
         Self::load_from(Source::Library(library.to_path_buf()), options)
@@ -219,7 +320,9 @@ impl Engine {
         let process = PROCESS.lock().unwrap_or_else(PoisonError::into_inner);
         let home = tempfile::tempdir()?;
         let mut state = State {
+            tables: options.tables,
             exports: None,
+            quake3e: None,
             // SAFETY: numbers and characters alone, for which zero is a value.
             config: Box::new(unsafe { std::mem::zeroed() }),
             cvars: cvars::Cvars::default(),
@@ -241,6 +344,7 @@ impl Engine {
             films: Vec::new(),
             film: Film::default(),
             windows: Vec::new(),
+            window_events: Vec::new(),
         };
         let defaults = [
             ("r_headless", "1"),
@@ -250,6 +354,7 @@ impl Engine {
             ("r_vkValidation", "1"),
             ("r_fullscreen", "0"),
             ("r_ignorehwgamma", "1"),
+            ("version", options.tables.version()),
         ];
         for (name, value) in defaults {
             state.cvars.set_by_user(name, value);
@@ -295,8 +400,7 @@ impl Engine {
             return Err(LoadError::Refused(printed));
         }
         // SAFETY: not NULL, so it is the renderer's table.
-        let exports = unsafe { *exports };
-        imports::with(|s| s.exports = Some(exports));
+        unsafe { keep_exports(self.tables, exports) };
         Ok(())
     }
 
@@ -307,10 +411,20 @@ impl Engine {
 
     /// `Shutdown`, with the window or without.
     pub fn shutdown(&mut self, destroy_window: bool) -> Result<(), Raised> {
+        let code = if destroy_window {
+            self.tables.close_code()
+        } else {
+            0
+        };
+        self.shutdown_with(code)
+    }
+
+    /// `Shutdown` with the engine's own code.
+    pub fn shutdown_with(&mut self, code: i32) -> Result<(), Raised> {
         let exports = self.exports();
         imports::with(|s| s.registered = false);
         // SAFETY: the library is loaded.
-        call(move || unsafe { (exports.Shutdown)(destroy_window.into()) })?;
+        call(move || unsafe { (exports.Shutdown)(code) })?;
         let left = imports::with(|s| s.commands.len()).unwrap_or(0);
         if left > 0 {
             imports::violation(format!("{left} commands were left after Shutdown"));
@@ -337,8 +451,13 @@ impl Engine {
 
     /// Restarts the video: the hunk goes first, then the renderer, its library with it, and both come back.
     pub fn restart_video(&mut self) -> Result<(), LoadError> {
+        self.restart_video_with(self.tables.close_code())
+    }
+
+    /// The same with the engine's own code for `Shutdown`.
+    pub fn restart_video_with(&mut self, code: i32) -> Result<(), LoadError> {
         imports::with(|s| s.memory.clear_hunk());
-        self.shutdown(true)?;
+        self.shutdown_with(code)?;
         self.library = None;
         imports::with(|s| s.exports = None);
         self.load_library()?;
@@ -370,7 +489,8 @@ impl Engine {
         let mut next = Some(text.to_string());
         while let Some(text) = next {
             if let Some(command) = prepare(&text) {
-                call(move || command())?;
+                // SAFETY: a command of the renderer, whose library is loaded.
+                call(move || unsafe { command() })?;
             }
             next = imports::with(|s| s.buffer.pop_front()).flatten();
         }
@@ -423,7 +543,7 @@ impl Engine {
     /// What the renderer wrote about itself.
     pub fn config(&self) -> glconfig_t {
         // SAFETY: numbers and characters alone.
-        imports::with(|s| (*s.config).clone()).unwrap_or_else(|| unsafe { std::mem::zeroed() })
+        imports::with(|s| *s.config).unwrap_or_else(|| unsafe { std::mem::zeroed() })
     }
 
     /// Adds or replaces a game file.
@@ -488,6 +608,21 @@ impl Engine {
     pub fn assert_clean(&self) {
         assert_eq!(self.violations(), Vec::<String>::new());
         assert_eq!(self.validation_messages(), Vec::<String>::new());
+    }
+
+    /// What happened to a window that the engine makes, since the last call.
+    pub fn take_window_events(&mut self) -> Vec<String> {
+        imports::with(|s| std::mem::take(&mut s.window_events)).unwrap_or_default()
+    }
+
+    /// The functions of a renderer for Quake3e.
+    ///
+    /// # Panics
+    /// With another engine's tables.
+    fn quake3e(&self) -> abi::quake3e::refexport_t {
+        imports::with(|s| s.quake3e)
+            .flatten()
+            .expect("Quake3e's tables")
     }
 
     fn exports(&self) -> refexport_t {

@@ -1,10 +1,15 @@
 //! What the library answers about models and the world: tags, bounds, entities, light, visibility, marks.
 
-use super::support::engine_in_map;
+use super::support::{engine_in_map, for_every_engine};
 use glam::Vec3;
 use tests::maps::{ELSEWHERE, HERE};
 
-#[test]
+for_every_engine!(
+    models_answer,
+    the_world_answers,
+    marks_are_clipped_to_surfaces,
+);
+
 fn models_answer() {
     let mut engine = engine_in_map();
     let model = engine.register_model("models/test.md3").unwrap();
@@ -37,7 +42,6 @@ fn models_answer() {
     engine.assert_clean();
 }
 
-#[test]
 fn the_world_answers() {
     let mut engine = engine_in_map();
     // ambient and directed light: shifted by two overbright bits, brought back into range, scaled by
@@ -72,7 +76,6 @@ fn the_world_answers() {
     engine.assert_clean();
 }
 
-#[test]
 fn marks_are_clipped_to_surfaces() {
     let mut engine = engine_in_map();
     // clockwise seen from where the mark comes from

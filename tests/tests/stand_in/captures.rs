@@ -1,11 +1,20 @@
 //! What leaves the renderer: screenshots, still pictures, frames of a video, costs.
 
-use super::support::{engine_in_map, image_of, text_of};
+use super::support::{engine_in_map, for_every_engine, image_of, text_of};
 use relight::compare::Rgb8;
 use tests::engine::{Engine, View};
 use tests::maps::{HERE, ROOMS};
 
-#[test]
+for_every_engine!(
+    screenshots_are_files,
+    captures_show_the_frame_in_which_they_were_asked_for,
+    what_is_not_written_is_not_called_written,
+    a_still_picture_that_its_map_does_not_live_to_see_is_told,
+    a_still_picture_is_made_beside_the_game,
+    costs_are_told_in_lines_and_as_json,
+    video_frames_reach_the_writer,
+);
+
 fn screenshots_are_files() {
     let mut engine = engine_in_map();
     let view = View::new(HERE, 30.0);
@@ -33,7 +42,6 @@ fn screenshots_are_files() {
     engine.assert_clean();
 }
 
-#[test]
 fn captures_show_the_frame_in_which_they_were_asked_for() {
     let mut engine = engine_in_map();
     let view = View::new(HERE, 30.0);
@@ -78,7 +86,6 @@ fn captures_show_the_frame_in_which_they_were_asked_for() {
     engine.assert_clean();
 }
 
-#[test]
 fn what_is_not_written_is_not_called_written() {
     let mut engine = engine_in_map();
     engine.set("r_rt", "1");
@@ -124,7 +131,6 @@ fn what_is_not_written_is_not_called_written() {
     engine.assert_clean();
 }
 
-#[test]
 fn a_still_picture_that_its_map_does_not_live_to_see_is_told() {
     let mut engine = engine_in_map();
     engine.set("r_rt", "1");
@@ -142,7 +148,6 @@ fn a_still_picture_that_its_map_does_not_live_to_see_is_told() {
     engine.assert_clean();
 }
 
-#[test]
 fn a_still_picture_is_made_beside_the_game() {
     let mut engine = engine_in_map();
     let view = View::new(HERE, 30.0);
@@ -211,7 +216,6 @@ fn a_still_picture_is_made_beside_the_game() {
     engine.assert_clean();
 }
 
-#[test]
 fn costs_are_told_in_lines_and_as_json() {
     let mut engine = engine_in_map();
     engine.set("r_rt", "1");
@@ -242,7 +246,6 @@ fn costs_are_told_in_lines_and_as_json() {
     engine.assert_clean();
 }
 
-#[test]
 fn video_frames_reach_the_writer() {
     let mut engine = engine_in_map();
     let view = View::new(HERE, 30.0);

@@ -6,6 +6,7 @@ mod answers;
 mod captures;
 mod game;
 mod pictures;
+mod quake3e;
 mod session;
 mod support;
 mod views;

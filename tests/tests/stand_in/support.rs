@@ -1,16 +1,42 @@
 //! What these tests share: the engine with the small game, and looking at pictures.
 
 use relight::compare::Rgb8;
-use tests::engine::{Engine, Message, Options};
+use std::cell::Cell;
+use tests::engine::{Engine, Message, Options, Tables};
 use tests::maps::{self, ROOMS};
+
+thread_local! {
+    static TABLES: Cell<Tables> = const { Cell::new(Tables::Ioquake3) };
+}
+
+/// Runs a test with the tables of an engine.
+pub(super) fn with_tables(tables: Tables, test: fn()) {
+    TABLES.set(tables);
+    test();
+}
+
+/// Makes a test of each function for each engine.
+macro_rules! for_every_engine {
+    ($($test:ident),* $(,)?) => {
+        mod ioquake3 { $( #[test] fn $test() { crate::support::with_tables(tests::engine::Tables::Ioquake3, super::$test); } )* }
+        mod openarena { $( #[test] fn $test() { crate::support::with_tables(tests::engine::Tables::OpenArena, super::$test); } )* }
+        mod quake3e { $( #[test] fn $test() { crate::support::with_tables(tests::engine::Tables::Quake3e, super::$test); } )* }
+    };
+}
+pub(super) use for_every_engine;
+
+/// The small game, and the tables of the engine under test.
+pub(super) fn options() -> Options {
+    Options {
+        files: maps::files(),
+        tables: TABLES.get(),
+        ..Options::default()
+    }
+}
 
 /// An engine with the small game, its menu registered.
 pub(super) fn engine() -> Engine {
-    Engine::start(Options {
-        files: maps::files(),
-        ..Options::default()
-    })
-    .expect("the library starts")
+    Engine::start(options()).expect("the library starts")
 }
 
 /// The same, in its map.

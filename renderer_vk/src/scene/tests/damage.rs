@@ -130,7 +130,7 @@ fn random_scenes_stay_within_their_arrays() {
                 origin: numbers.vec(),
                 radius: numbers.float(),
                 color: numbers.vec(),
-                additive: false,
+                ..DynamicLight::default()
             });
             let corner = PolyVert {
                 position: numbers.vec(),

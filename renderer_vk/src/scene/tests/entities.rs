@@ -335,7 +335,7 @@ fn brush_models_keep_one_bit_for_all_lights() {
         origin: Vec3::new(-40.0, 50.0, 0.0),
         radius: 30.0,
         color: Vec3::ONE,
-        additive: false,
+        ..DynamicLight::default()
     };
     let short = DynamicLight {
         radius: 5.0,

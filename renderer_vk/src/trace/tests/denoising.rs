@@ -155,7 +155,7 @@ fn lamp(origin: Vec3) -> DynamicLight {
         origin,
         radius: 300.0,
         color: Vec3::ONE,
-        additive: false,
+        ..DynamicLight::default()
     }
 }
 

@@ -61,7 +61,7 @@ fn a_change_of_light_shortens_history_as_far_as_it_reaches_and_no_farther(gpu: &
                     origin: Vec3::new(180.0, 60.0, 0.0),
                     radius: 200.0,
                     color: Vec3::ONE,
-                    additive: false,
+                    ..DynamicLight::default()
                 });
             }
         };
@@ -148,7 +148,7 @@ fn antialiasing_keeps_nothing_of_light_that_fades(gpu: &mut Gpu) {
                 origin: Vec3::new(170.0, 60.0, 0.0),
                 radius: 200.0,
                 color: Vec3::splat(0.2 * left),
-                additive: false,
+                ..DynamicLight::default()
             }];
         };
         let (light, _) = gpu.render_views(&scene, &settings, 32, lamp);

@@ -286,7 +286,7 @@ impl Scene {
             origin,
             radius,
             color: Vec3::splat(color),
-            additive: false,
+            ..DynamicLight::default()
         });
     }
 

@@ -1,7 +1,6 @@
 //! Registration, frames and shutdown: lifetime of the window, the device and the assets.
 
-use super::abi::{QBool, glconfig_t};
-use super::glconfig;
+use crate::abi::{QBool, STEREO_LEFT, STEREO_RIGHT, glconfig_t};
 use crate::boundary::entry;
 use crate::capture::{self, VideoFrame};
 use crate::commands;
@@ -10,10 +9,11 @@ use crate::delivery::{Outbox, deliver, take_captures, take_captures_of_last_fram
 use crate::engine::{self, Engine, valid_game_path};
 use crate::failure::Failure;
 use crate::files::EngineFiles;
+use crate::glconfig;
 use crate::session::{self, Front, with_renderer};
 use crate::window::{self, Window};
 use renderer_vk::{Eye, Renderer, RendererOptions};
-use std::ffi::c_int;
+use std::ffi::{CStr, c_int};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -30,19 +30,22 @@ pub fn probe(engine: Engine) -> Result<(), String> {
 }
 
 fn wanted_device(cvars: &Cvars) -> Option<String> {
-    Some(cvars.string(Cvar::Device)).filter(|name| !name.is_empty())
+    // -1 is what an engine archives under this name for the best device
+    Some(cvars.string(Cvar::Device)).filter(|name| !name.is_empty() && name != "-1")
 }
 
 /// Our folder in the game's writable folder, for light calibrations and pipeline caches.
 fn cache_folder(engine: Engine) -> Option<PathBuf> {
-    let home = engine.cvar_text(c"fs_homepath");
-    let game = [c"fs_game", c"com_basegame"]
-        .map(|name| engine.cvar_text(name))
-        .into_iter()
-        .find(|game| !game.is_empty())?;
+    let first = |names: &[&CStr]| {
+        let mut values = names.iter().map(|name| engine.cvar_text(name));
+        values.find(|value| !value.is_empty())
+    };
+    // newer engines have folders for data and state in place of one home
+    let home = first(&[c"fs_homepath", c"fs_homestatepath", c"fs_homedatapath"])?;
+    let game = first(&[c"fs_game", engine.front_end()?.base_game])?;
     // a game folder is a single name; other values are not used as a path
     let plain = !game.contains(['/', '\\', ':']) && !game.contains("..");
-    (plain && !home.is_empty()).then(|| PathBuf::from(home).join(game).join("relight"))
+    plain.then(|| PathBuf::from(home).join(game).join("relight"))
 }
 
 /// `re.BeginRegistration`.
@@ -103,7 +106,7 @@ fn start_renderer(
     cache_folder: Option<&Path>,
 ) -> Result<(), Failure> {
     if window::current().is_some_and(|window| window.stale) {
-        window::close(engine, false);
+        window::close(engine, window::Closing::ForAnother);
     }
     let headless = cvars.flag(Cvar::Headless);
     let made = if headless {
@@ -144,9 +147,12 @@ fn start_renderer(
             Ok(())
         }
         Err(message) => {
-            window::close(engine, true);
+            window::close(engine, window::Closing::Video);
             Err(Failure::fatal(format!(
-                "Relight cannot start: {message}. Start the game with \"+set cl_renderer opengl1\" to play without it."
+                "Relight cannot start: {message}. Start the game with \"+set cl_renderer {}\" to play without it.",
+                engine
+                    .front_end()
+                    .map_or("opengl1", |front| front.opengl[0])
             )))
         }
     }
@@ -191,50 +197,82 @@ fn describe(renderer: &Renderer, front: &mut Front) -> glconfig_t {
     glconfig::glconfig(renderer.device_info(), screen)
 }
 
-/// `re.Shutdown`. May be called repeatedly, before any registration, and from inside an error of the engine.
+/// What a shutdown leaves open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// The window and the device: the map changes.
+    KeepAll,
+    /// The window.
+    KeepWindow,
+    /// Nothing; video may start again.
+    Close,
+    /// Nothing, for good.
+    Leave,
+}
+
+/// `re.Shutdown` of engines that pass whether to close the window. May be called repeatedly, before any registration,
+/// and from inside an error of the engine.
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract). Any number but 0 closes the window; the engine's input code,
 /// which is notified first, must not use it afterwards. Buffers of [`take_video_frame`] are forgotten.
 pub unsafe extern "C" fn shutdown(destroy_window: QBool) {
     entry(|| {
-        session::abandon_if_taken();
-        let Some(engine) = engine::current() else {
-            return Ok(());
-        };
-        // Captures of a frame that will not end show the part drawn so far.
-        if let Ok(outbox) = with_renderer(|renderer, front| {
-            // The buffer of a video frame may be invalid by now.
-            front.captures.video = None;
-            let mut outbox = Outbox::default();
-            outbox.lines.extend(give_up_still(renderer, front));
-            take_captures(renderer, front, &mut outbox).map(|()| outbox)
-        }) {
-            deliver(engine, outbox);
-        }
-        // The engine would keep our function pointers after unloading the library.
-        commands::remove(engine);
-        let destroyed = session::with(|session| {
-            session.front.registered = false;
-            session.front.captures.clear();
-            session.front.cinematics.clear();
-            if let Some(renderer) = &mut session.renderer {
-                renderer.shutdown_registration();
-            }
-            if destroy_window != 0 {
-                session.front.size = (0, 0);
-                session.renderer.take()
-            } else {
-                None
-            }
+        end(if destroy_window == 0 {
+            Ending::KeepAll
+        } else {
+            Ending::Close
         });
-        // The surface must be destroyed before its window.
-        drop(destroyed);
-        if destroy_window != 0 {
-            window::close(engine, true);
-        }
         Ok(())
     });
+}
+
+/// Ends the registration. For functions that the engine calls as `Shutdown`, inside of [`entry`].
+pub fn end(ending: Ending) {
+    session::abandon_if_taken();
+    let Some(engine) = engine::current() else {
+        return;
+    };
+    // Captures of a frame that will not end show the part drawn so far.
+    if let Ok(outbox) = with_renderer(|renderer, front| {
+        // The buffer of a video frame may be invalid by now.
+        front.captures.video = None;
+        let mut outbox = Outbox::default();
+        outbox.lines.extend(give_up_still(renderer, front));
+        take_captures(renderer, front, &mut outbox).map(|()| outbox)
+    }) {
+        deliver(engine, outbox);
+    }
+    // The engine would keep our function pointers after unloading the library.
+    commands::remove(engine);
+    let destroyed = session::with(|session| {
+        session.front.registered = false;
+        session.front.captures.clear();
+        session.front.cinematics.clear();
+        if let Some(renderer) = &mut session.renderer {
+            renderer.shutdown_registration();
+        }
+        session.front.kept = matches!(ending, Ending::KeepAll | Ending::KeepWindow);
+        if ending == Ending::KeepAll {
+            None
+        } else {
+            session.front.size = (0, 0);
+            session.renderer.take()
+        }
+    });
+    // The surface must be destroyed before its window.
+    drop(destroyed);
+    if matches!(ending, Ending::Close | Ending::Leave) {
+        window::close(
+            engine,
+            if ending == Ending::Leave {
+                window::Closing::Leave
+            } else {
+                window::Closing::Video
+            },
+        );
+    }
+    engine.free_all();
 }
 
 /// `re.EndRegistration`.
@@ -262,8 +300,8 @@ pub unsafe extern "C" fn begin_frame(stereo: c_int) {
         with_renderer(|renderer, front| {
             // with r_anaglyphMode the engine sends every frame twice
             let eye = match stereo {
-                super::abi::STEREO_LEFT => Eye::Left,
-                super::abi::STEREO_RIGHT => Eye::Right,
+                STEREO_LEFT => Eye::Left,
+                STEREO_RIGHT => Eye::Right,
                 _ => Eye::Both,
             };
             if eye == Eye::Right {
@@ -333,7 +371,8 @@ fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Fa
         .take()
         .map_or(0, |begin| milliseconds(start - begin));
     take_captures(renderer, front, &mut outbox)?;
-    renderer.set_hidden(window::current().is_some_and(|window| window.is_hidden()));
+    let skipped = std::mem::take(&mut front.skip_present);
+    renderer.set_hidden(skipped || window::current().is_some_and(|window| window.is_hidden()));
     let stats = renderer.end_frame().map_err(Failure::from)?;
     front.has_picture = true;
     outbox.back_end_ms = milliseconds(start.elapsed());

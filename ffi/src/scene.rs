@@ -1,10 +1,11 @@
 //! Registration of assets, the scene, 2D drawing and queries of the world.
 
-use super::abi::{
+use crate::abi::{
     QBool, Vec3C, fontInfo_t, markFragment_t, orientation_t, polyVert_t, refEntity_t, refdef_t,
 };
-use super::convert;
 use crate::boundary::entry;
+use crate::convert;
+pub use crate::convert::ShaderTime;
 use crate::cvars::{self, Cvar, Cvars};
 use crate::engine::{self, string_from, text_of};
 use crate::failure::Failure;
@@ -149,6 +150,15 @@ pub unsafe extern "C" fn clear_scene() {
 /// The [call contract](crate::boundary#call-contract). `from` must be null, which adds nothing, or point at a
 /// `refEntity_t`, whose members may hold any value. It is copied.
 pub unsafe extern "C" fn add_ref_entity(from: *const refEntity_t) {
+    // SAFETY: null or an entity by this function's contract.
+    unsafe { add_entity(from, ShaderTime::Seconds) };
+}
+
+/// Adds an entity whose `shaderTime` has a unit.
+///
+/// # Safety
+/// That of [`add_ref_entity`].
+pub unsafe fn add_entity(from: *const refEntity_t, time: ShaderTime) {
     entry(|| {
         if from.is_null() {
             return Ok(());
@@ -166,7 +176,7 @@ pub unsafe extern "C" fn add_ref_entity(from: *const refEntity_t) {
                 }
                 return Ok(());
             }
-            let Some(entity) = convert::entity(&from) else {
+            let Some(entity) = convert::entity(&from, time) else {
                 return Err(Failure::drop(format!(
                     "the game sent an entity of type {}, which does not exist",
                     from.reType
@@ -244,6 +254,7 @@ unsafe fn add_light_of(origin: *const Vec3C, radius: f32, color: Vec3, additive:
                     radius,
                     color,
                     additive,
+                    end: None,
                 });
             }
             Ok(())
@@ -281,6 +292,30 @@ pub unsafe extern "C" fn add_additive_light(
 ) {
     // SAFETY: the light's origin, null or three floats by this function's contract.
     unsafe { add_light_of(origin, radius, Vec3::new(r, g, b), true) };
+}
+
+/// Adds a light along a line.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `start` and `end` must each be null, which counts as the world's
+/// origin, or point at three floats.
+pub unsafe fn add_light_along(start: *const Vec3C, end: *const Vec3C, radius: f32, color: Vec3) {
+    entry(|| {
+        // SAFETY: null or three floats each by this function's contract.
+        let [origin, end] = [start, end].map(|place| unsafe { convert::vector(place) });
+        draw(|renderer, _| {
+            if radius > 0.0 && origin.is_finite() && end.is_finite() && color.is_finite() {
+                renderer.add_light(DynamicLight {
+                    origin,
+                    radius,
+                    color,
+                    end: Some(end),
+                    ..DynamicLight::default()
+                });
+            }
+            Ok(())
+        })
+    });
 }
 
 /// `re.RenderScene`. A view of the map without a map ends in the engine's `Error`.

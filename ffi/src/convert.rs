@@ -1,6 +1,6 @@
 //! Conversions between the engine's structures and the renderer's types.
 
-use super::abi::{
+use crate::abi::{
     Vec3C, fontInfo_t, glyphInfo_t, markFragment_t, orientation_t, polyVert_t, refEntity_t,
     refdef_t,
 };
@@ -24,8 +24,23 @@ fn entity_kind(number: i32) -> Option<EntityKind> {
     })
 }
 
+/// Unit of an entity's `shaderTime`.
+#[derive(Clone, Copy, Debug)]
+pub enum ShaderTime {
+    /// A float.
+    Seconds,
+    /// An integer in the float's place.
+    Milliseconds,
+}
+
 /// An entity; `None` if its type is invalid.
-pub fn entity(from: &refEntity_t) -> Option<RefEntity> {
+pub fn entity(from: &refEntity_t, time: ShaderTime) -> Option<RefEntity> {
+    let shader_time = match time {
+        ShaderTime::Seconds => from.shaderTime,
+        ShaderTime::Milliseconds => {
+            (f64::from(from.shaderTime.to_bits().cast_signed()) * 0.001) as f32
+        }
+    };
     Some(RefEntity {
         kind: entity_kind(from.reType)?,
         renderfx: from.renderfx.cast_unsigned(),
@@ -44,7 +59,7 @@ pub fn entity(from: &refEntity_t) -> Option<RefEntity> {
         custom_shader: from.customShader,
         shader_rgba: from.shaderRGBA,
         shader_texcoord: Vec2::from(from.shaderTexCoord),
-        shader_time: from.shaderTime,
+        shader_time,
         radius: from.radius,
         rotation: from.rotation,
     })
@@ -176,7 +191,7 @@ pub unsafe fn write_vector(to: *mut Vec3C, vector: Vec3) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ioq3::abi::RT_MAX_REF_ENTITY_TYPE;
+    use crate::abi::RT_MAX_REF_ENTITY_TYPE;
 
     #[test]
     fn every_entity_type_of_the_engine_is_known_and_no_other() {

@@ -1,6 +1,6 @@
 //! Properties of the renderer for the engine, its menus and the game (`glconfig_t`).
 
-use super::abi::{QBool, glconfig_t};
+use crate::abi::{QBool, glconfig_t};
 use crate::config::DeviceStrings;
 use renderer_vk::DeviceInfo;
 use std::ffi::c_char;

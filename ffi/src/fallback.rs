@@ -3,20 +3,24 @@
 //! The engine calls `GetRefAPI` before any window exists, and tries no other library once ours is loaded. Therefore the
 //! other renderer is loaded there, and its functions are returned instead of ours.
 
-use super::abi::{QBool, refexport_t, refimport_t};
-use crate::engine::Engine;
+use crate::abi::functions::Shutdown;
+use crate::engine::{Engine, FrontEnd, MainThread};
 use libloading::Library;
-use std::ffi::c_int;
+use std::cell::UnsafeCell;
+use std::ffi::{c_int, c_void};
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
-type GetRefApi = unsafe extern "C" fn(c_int, *const refimport_t) -> *const refexport_t;
+type GetRefApi = unsafe extern "C" fn(c_int, *const c_void) -> *const c_void;
+
+/// The substitute's table, with our `Shutdown` as the first entry: the engine reads it. Larger than any engine's.
+static EXPORTS: MainThread<[usize; 64]> = MainThread(UnsafeCell::new([0; 64]));
 
 /// The substitute renderer.
 struct Substitute {
     /// Closed after the engine's last `Shutdown`, as the engine would do.
     _library: Library,
-    shutdown: unsafe extern "C" fn(QBool),
+    shutdown: Shutdown,
 }
 
 static SUBSTITUTE: Mutex<Option<Substitute>> = Mutex::new(None);
@@ -33,23 +37,25 @@ fn engine_architecture() -> &'static str {
     }
 }
 
-/// File names to try, best first: opengl1 looks and runs the same everywhere.
-fn file_names() -> Vec<String> {
+/// File names to try, best first.
+fn file_names(front: &FrontEnd) -> Vec<String> {
     let (arch, suffix) = (engine_architecture(), std::env::consts::DLL_SUFFIX);
-    ["opengl1", "opengl2"]
-        .iter()
+    let file =
+        |name: &str, pattern: &str| pattern.replace("NAME", name).replace("ARCH", arch) + suffix;
+    let names = front.opengl.iter();
+    names
         .flat_map(|name| {
-            [
-                format!("renderer_{name}_{arch}{suffix}"),
-                format!("renderer_{name}{suffix}"),
-            ]
+            front
+                .libraries
+                .iter()
+                .map(move |pattern| file(name, pattern))
         })
         .collect()
 }
 
-/// The folder of this library's file.
+/// This library's file.
 #[cfg(unix)]
-fn own_folder() -> Option<PathBuf> {
+pub fn own_file() -> Option<PathBuf> {
     use std::ffi::{CStr, OsStr, c_char, c_void};
     use std::os::unix::ffi::OsStrExt;
 
@@ -74,29 +80,31 @@ fn own_folder() -> Option<PathBuf> {
         && !info.file_name.is_null();
     // SAFETY: a string of the dynamic loader.
     let file = known.then(|| unsafe { CStr::from_ptr(info.file_name) })?;
-    PathBuf::from(OsStr::from_bytes(file.to_bytes()))
-        .parent()
-        .map(PathBuf::from)
+    Some(PathBuf::from(OsStr::from_bytes(file.to_bytes())))
 }
 
+/// This library's file.
 #[cfg(not(unix))]
-fn own_folder() -> Option<PathBuf> {
+pub fn own_file() -> Option<PathBuf> {
     None
 }
 
+/// The folder of this library's file.
+fn own_folder() -> Option<PathBuf> {
+    own_file()?.parent().map(PathBuf::from)
+}
+
 /// Folders to search, in order, each once.
-fn folders() -> Vec<PathBuf> {
+fn folders(front: &FrontEnd) -> Vec<PathBuf> {
     let program = std::env::args_os()
         .next()
         .and_then(|program| PathBuf::from(program).parent().map(PathBuf::from));
     let mut list: Vec<PathBuf> = Vec::new();
-    for folder in [
-        own_folder(),
-        program,
-        Some(PathBuf::from("/usr/lib/ioquake3")),
-    ]
-    .into_iter()
-    .flatten()
+    let installed = front.folders.iter().map(PathBuf::from);
+    for folder in [own_folder(), program]
+        .into_iter()
+        .flatten()
+        .chain(installed)
     {
         if !list.contains(&folder) {
             list.push(folder);
@@ -105,17 +113,18 @@ fn folders() -> Vec<PathBuf> {
     list
 }
 
-/// Loads another renderer and returns its functions, with `Shutdown` replaced by ours.
+/// Loads another renderer and returns its table, with `Shutdown` replaced by ours.
 ///
 /// # Safety
-/// `table` must be the engine's import table, the argument of `GetRefAPI`.
+/// `table` must be the engine's import table, the argument of `GetRefAPI`, and this the engine's main thread.
 pub unsafe fn load(
     engine: Engine,
     api_version: c_int,
-    table: *const refimport_t,
-) -> Option<refexport_t> {
+    table: *const c_void,
+) -> Option<*const c_void> {
+    let front = engine.front_end()?;
     // SAFETY: `table` is the engine's import table by this function's contract.
-    unsafe { load_from(&folders(), engine, api_version, table) }
+    unsafe { load_from(&folders(front), front, engine, api_version, table) }
 }
 
 /// [`load`] from given folders.
@@ -124,14 +133,15 @@ pub unsafe fn load(
 /// `table` must be the engine's import table, the argument of `GetRefAPI`, or valid for the renderers in `folders`.
 unsafe fn load_from(
     folders: &[PathBuf],
+    front: &FrontEnd,
     engine: Engine,
     api_version: c_int,
-    table: *const refimport_t,
-) -> Option<refexport_t> {
+    table: *const c_void,
+) -> Option<*const c_void> {
     // A substitute that was never shut down must not be loaded twice.
     drop(substitute().take());
     for folder in folders {
-        for name in file_names() {
+        for name in file_names(front) {
             let path = folder.join(name);
             if !path.is_file() {
                 continue;
@@ -159,15 +169,21 @@ unsafe fn load_from(
             if exports.is_null() {
                 continue;
             }
-            // SAFETY: not null, so it is the renderer's static table, which is valid as long as its library is loaded.
-            let mut exports = unsafe { exports.read_unaligned() };
             engine.say(&format!("Relight: using {} instead\n", path.display()));
+            // SAFETY: not null, so it is the renderer's static table, which lives as long as its library; its first
+            // entry is `Shutdown`.
+            let theirs = unsafe { exports.cast::<Shutdown>().read_unaligned() };
             *substitute() = Some(Substitute {
                 _library: library,
-                shutdown: exports.Shutdown,
+                shutdown: theirs,
             });
-            exports.Shutdown = shutdown;
-            return Some(exports);
+            let ours = EXPORTS.0.get().cast::<usize>();
+            // SAFETY: both tables have that many entries; ours is static, and used on this thread only.
+            unsafe {
+                ours.copy_from_nonoverlapping(exports.cast(), front.functions.min(64));
+                ours.cast::<Shutdown>().write(shutdown);
+            }
+            return Some(ours.cast_const().cast());
         }
     }
     None
@@ -180,7 +196,7 @@ unsafe fn load_from(
 /// The [call contract](crate::boundary#call-contract), except that no Rust code with destructors runs: the substitute
 /// may end in the engine's `Error`, which crosses this frame while it owns nothing. Any number but 0 ends the
 /// substitute; none of its functions may be called afterwards.
-unsafe extern "C" fn shutdown(destroy_window: QBool) {
+unsafe extern "C" fn shutdown(destroy_window: c_int) {
     let function = substitute().as_ref().map(|substitute| substitute.shutdown);
     if let Some(function) = function {
         // SAFETY: the substitute's own `Shutdown`; its library is closed below at the earliest.
@@ -195,10 +211,18 @@ unsafe extern "C" fn shutdown(destroy_window: QBool) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::front_ends::FRONT_ENDS;
 
     #[test]
-    fn both_spellings_of_opengl1_come_before_opengl2() {
-        let names = file_names();
+    fn all_spellings_of_the_best_renderer_come_first() {
+        for front in FRONT_ENDS {
+            assert!(front.functions <= 64, "{}", front.name);
+            assert_eq!(
+                file_names(front).len(),
+                front.opengl.len() * front.libraries.len()
+            );
+        }
+        let names = file_names(FRONT_ENDS[0]);
         assert_eq!(names.len(), 4);
         assert!(
             names[0].starts_with("renderer_opengl1_") && names[1].starts_with("renderer_opengl1.")
@@ -219,7 +243,7 @@ mod tests {
         };
         let engine = crate::engine::current().unwrap();
         let folder = scratch("substitute");
-        let library = folder.join(&file_names()[0]);
+        let library = folder.join(&file_names(FRONT_ENDS[0])[0]);
         let report = folder.join("report");
         let arguments = ["-shared", "-fPIC", "-Wall"];
         let Some(()) = compile(&source("test_renderer.c"), &library, &arguments) else {
@@ -232,7 +256,15 @@ mod tests {
         let load = |version| {
             let folders = [folder.join("nowhere"), folder.clone()];
             // SAFETY: the test renderer reads only its first entry, as a path.
-            unsafe { load_from(&folders, engine, version, table.as_ptr().cast()) }
+            unsafe {
+                load_from(
+                    &folders,
+                    FRONT_ENDS[0],
+                    engine,
+                    version,
+                    table.as_ptr().cast(),
+                )
+            }
         };
         let loaded = || {
             const NOLOAD: c_int = 4;
@@ -242,7 +274,8 @@ mod tests {
         assert!(load(7).is_none(), "it refuses other versions");
         assert!(!loaded());
         for _ in 0..2 {
-            let exports = load(8).map(|exports| exports.Shutdown).unwrap();
+            // SAFETY: the table's first entry.
+            let exports: Shutdown = unsafe { load(8).unwrap().cast::<Shutdown>().read() };
             // SAFETY: `shutdown` of a substitute that calls no service of the engine: it returns.
             unsafe { exports(0) };
             assert!(loaded());
@@ -256,8 +289,9 @@ mod tests {
 
     #[test]
     fn our_own_folder_is_searched_first() {
-        let folders = folders();
+        let folders = folders(FRONT_ENDS[0]);
         assert_eq!(folders.first(), own_folder().as_ref());
-        assert!(folders.contains(&PathBuf::from("/usr/lib/ioquake3")));
+        let installed = PathBuf::from(FRONT_ENDS[0].folders[0]);
+        assert!(folders.contains(&installed));
     }
 }

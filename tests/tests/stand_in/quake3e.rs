@@ -1,0 +1,114 @@
+//! What Quake3e alone asks of its renderer: a window that the engine makes, codes of `Shutdown`, times in
+//! milliseconds, lights along lines.
+
+use super::support::options;
+use glam::Vec3;
+use tests::engine::abi::refEntity_t;
+use tests::engine::{Engine, Options, Tables, View};
+use tests::maps::{HERE, ROOMS};
+
+fn quake3e(cvars: &[(&str, &str)]) -> Engine {
+    let cvars = cvars
+        .iter()
+        .map(|(name, value)| ((*name).to_owned(), (*value).to_owned()));
+    Engine::start(Options {
+        tables: Tables::Quake3e,
+        cvars: cvars.collect(),
+        ..options()
+    })
+    .expect("the library starts")
+}
+
+#[test]
+fn the_window_is_the_engines_and_outlives_what_the_code_of_shutdown_keeps() {
+    let mut engine = quake3e(&[("r_headless", "0"), ("r_device", "-1")]);
+    let scale = "scale 1 320x240";
+    assert_eq!(engine.take_window_events(), ["open", "surface", scale]);
+    assert_eq!(engine.config().displayFrequency, 60);
+    assert_eq!(engine.kept_size().unwrap(), (320, 240));
+    engine.start_map(ROOMS).unwrap();
+    let view = View::new(HERE, 30.0);
+    let first = engine.picture(&view).unwrap();
+    // a map change keeps everything
+    assert_eq!(engine.take_window_events(), ["FreeAll", "FreeAll", scale]);
+    let mut restart = |code: i32, events: &[&str]| {
+        engine.restart_video_with(code).unwrap();
+        engine.load_world(ROOMS).unwrap();
+        engine.end_registration().unwrap();
+        assert_eq!(engine.picture(&view).unwrap(), first, "after code {code}");
+        assert_eq!(engine.take_window_events(), events, "after code {code}");
+    };
+    // the device, the window, nothing
+    restart(0, &["FreeAll", scale]);
+    restart(1, &["FreeAll", "surface", scale]);
+    restart(2, &["close 0", "FreeAll", "open", "surface", scale]);
+    restart(3, &["close 1", "FreeAll", "open", "surface", scale]);
+    engine.throttle().unwrap();
+    assert_eq!(
+        engine.picture(&view).unwrap(),
+        first,
+        "a frame that is not shown"
+    );
+    engine.assert_clean();
+}
+
+#[test]
+fn variables_have_the_engines_defaults() {
+    let engine = quake3e(&[]);
+    for (name, default) in [
+        ("r_picmip", "0"),
+        ("r_subdivisions", "1"),
+        ("r_lodbias", "-2"),
+    ] {
+        let (_, reset, _) = engine.describe_cvar(name).unwrap();
+        assert_eq!(reset, default, "{name}");
+    }
+    // the engine's own: no flags of ours
+    let (flags, ..) = engine.describe_cvar("r_swapInterval").unwrap();
+    assert_eq!(flags, 0);
+    engine.assert_clean();
+}
+
+#[test]
+fn times_of_entities_may_be_milliseconds() {
+    let mut engine = quake3e(&[]);
+    engine.start_map(ROOMS).unwrap();
+    let model = engine.register_model("models/test.md3").unwrap();
+    let shader = engine.register_shader("textures/test/scroll").unwrap();
+    let entity = refEntity_t {
+        hModel: model,
+        customShader: shader,
+        origin: (HERE + Vec3::X * 60.0).to_array(),
+        shaderTime: 0.75,
+        ..refEntity_t::default()
+    };
+    let mut picture = |milliseconds: Option<i32>| {
+        engine
+            .picture_of(|engine| {
+                engine.clear_scene()?;
+                match milliseconds {
+                    Some(time) => engine.add_entity_in_milliseconds(&entity, time)?,
+                    None => engine.add_entity(&entity)?,
+                }
+                engine.render_scene(&View::new(HERE, 0.0))
+            })
+            .unwrap()
+    };
+    let seconds = picture(None);
+    assert_eq!(picture(Some(750)), seconds);
+    assert_ne!(picture(Some(640)), seconds);
+    engine.assert_clean();
+}
+
+#[test]
+fn extended_scripts_are_read() {
+    let mut options = options();
+    let script = |image: &str| format!("test/extended\n{{\n{{\nmap {image}\n}}\n}}\n").into_bytes();
+    options.tables = Tables::Quake3e;
+    options
+        .files
+        .push(("scripts/more.shaderx".to_owned(), script("$whiteimage")));
+    let mut engine = Engine::start(options).expect("the library starts");
+    assert!(engine.register_shader("test/extended").unwrap() > 0);
+    engine.assert_clean();
+}
