@@ -17,7 +17,7 @@ use std::ffi::{CStr, CString};
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract): the engine runs commands from its command buffer, on its main
-/// thread, from C frames. There are no parameters; a command reads its words by [`engine::Services::arguments`] and
+/// thread, from C frames. There are no parameters; a command reads its words by [`engine::Engine::arguments`] and
 /// prints a message for invalid ones.
 type Function = unsafe extern "C" fn();
 

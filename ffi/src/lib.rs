@@ -53,6 +53,7 @@ mod load;
 mod logging;
 pub mod openarena;
 pub mod quake3e;
+mod queries;
 mod recognize;
 mod scene;
 mod session;

@@ -46,8 +46,13 @@ pub unsafe fn recognize(imports: *const c_void) -> Result<Engine, String> {
     // An unset variable counts as empty.
     let wanted = std::env::var(VARIABLE).unwrap_or_default();
     if !wanted.is_empty() {
-        let front =
-            named(&wanted).ok_or_else(|| refusal(&format!("{VARIABLE} is {wanted}"), OPENGL))?;
+        let opengl = match by_file_name().or_else(executable) {
+            Some(Found::Supported(front)) => front.opengl[0],
+            Some(Found::Other(_, opengl)) => opengl,
+            None => OPENGL,
+        };
+        let unknown = || refusal(&format!("{VARIABLE} is {wanted}"), opengl);
+        let front = named(&wanted).ok_or_else(unknown)?;
         // SAFETY: the player says that it is this engine's table; the rest is this function's contract.
         return Ok(unsafe { (front.install)(imports) });
     }

@@ -221,7 +221,7 @@ impl Engine {
 
     /// Reads a whole game file; `None` if it does not exist.
     ///
-    /// The name must have passed [`valid_game_path`].
+    /// The name must have passed [`valid_game_path`](super::valid_game_path).
     pub fn read_file(self, name: &CStr) -> Option<Vec<u8>> {
         let read = self.get(|t| t.fs_read_file)?;
         let free = self.get(|t| t.fs_free_file)?;
@@ -340,7 +340,7 @@ impl Engine {
     /// Passes the window to the engine's input code.
     ///
     /// # Safety
-    /// `window` must be an `SDL_Window` of the process's SDL, valid until [`Services::input_shutdown`].
+    /// `window` must be an `SDL_Window` of the process's SDL, valid until [`Engine::input_shutdown`].
     pub unsafe fn input_init(self, window: *mut c_void) {
         if let Some(f) = self.get(|t| t.in_init) {
             // SAFETY: `window` is an SDL window that stays open until `input_shutdown` by this function's contract.

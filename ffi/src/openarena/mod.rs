@@ -25,7 +25,11 @@ pub(crate) static FRONT_END: FrontEnd = FrontEnd {
     libraries: &["renderer_NAME_ARCH", "renderer_NAME"],
     folders: &[],
     base_game: c"com_basegame",
-    defaults: &[],
+    defaults: &[
+        ("r_fullscreen", "1"),
+        ("r_mode", "-2"),
+        ("r_textureMode", "GL_LINEAR_MIPMAP_NEAREST"),
+    ],
     owned: &[],
     scripts: &[],
 };

@@ -385,7 +385,7 @@ mod tests {
                 })
                 .sum();
             assert!(
-                (irradiance / PI - 1.0).abs() < 0.04,
+                (irradiance / PI - 1.0).abs() < 0.05,
                 "{length}: {irradiance}"
             );
         }

@@ -9,8 +9,6 @@ for_every_engine!(
     screenshots_are_files,
     captures_show_the_frame_in_which_they_were_asked_for,
     what_is_not_written_is_not_called_written,
-    a_still_picture_that_its_map_does_not_live_to_see_is_told,
-    a_still_picture_is_made_beside_the_game,
     costs_are_told_in_lines_and_as_json,
     video_frames_reach_the_writer,
 );
@@ -131,6 +129,7 @@ fn what_is_not_written_is_not_called_written() {
     engine.assert_clean();
 }
 
+#[test]
 fn a_still_picture_that_its_map_does_not_live_to_see_is_told() {
     let mut engine = engine_in_map();
     engine.set("r_rt", "1");
@@ -148,6 +147,7 @@ fn a_still_picture_that_its_map_does_not_live_to_see_is_told() {
     engine.assert_clean();
 }
 
+#[test]
 fn a_still_picture_is_made_beside_the_game() {
     let mut engine = engine_in_map();
     let view = View::new(HERE, 30.0);

@@ -112,3 +112,39 @@ fn extended_scripts_are_read() {
     assert!(engine.register_shader("test/extended").unwrap() > 0);
     engine.assert_clean();
 }
+
+#[test]
+fn lights_along_lines_light_in_both_looks() {
+    let mut engine = quake3e(&[]);
+    engine.start_map(ROOMS).unwrap();
+    let ends = [
+        HERE + Vec3::new(60.0, -80.0, 0.0),
+        HERE + Vec3::new(60.0, 80.0, 0.0),
+    ];
+    for look in ["0", "1"] {
+        engine.set("r_rt", look);
+        let mut brightness = |lit: bool| {
+            let picture = engine.picture_of(|engine| {
+                engine.clear_scene()?;
+                if lit {
+                    engine.add_linear_light(ends, 200.0, Vec3::ONE)?;
+                }
+                engine.render_scene(&View::new(HERE, 0.0))
+            });
+            picture.unwrap().mean_luminance()
+        };
+        let dark = brightness(false);
+        assert!(brightness(true) > dark + 5.0, "r_rt {look}: {dark}");
+    }
+    engine.assert_clean();
+}
+
+#[test]
+fn menus_are_not_lit_by_vertices() {
+    let mut engine = quake3e(&[("r_vertexLight", "1")]);
+    for (allowed, covered) in [(false, "1"), (true, "0")] {
+        engine.vertex_lighting(allowed).unwrap();
+        assert_eq!(engine.cvar("r_uifullscreen").as_deref(), Some(covered));
+    }
+    engine.assert_clean();
+}

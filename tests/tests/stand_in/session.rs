@@ -12,6 +12,7 @@ for_every_engine!(
     sessions_change_maps_and_restart,
     calls_outside_of_registration_are_harmless,
     latched_and_live_settings_take_effect,
+    caches_lie_in_the_first_home_that_the_engine_has,
 );
 
 fn text(characters: &[std::ffi::c_char]) -> String {
@@ -210,6 +211,26 @@ fn latched_and_live_settings_take_effect() {
     engine.set("r_lightmap", "1");
     assert_ne!(engine.picture(&view).unwrap(), normal, "r_lightmap is live");
     engine.assert_clean();
+}
+
+fn caches_lie_in_the_first_home_that_the_engine_has() {
+    // newer engines leave fs_homepath empty
+    for name in ["fs_homepath", "fs_homestatepath", "fs_homedatapath"] {
+        let home = tempfile::tempdir().unwrap();
+        let mut options = options();
+        let base = match options.tables {
+            Tables::Quake3e => "fs_basegame",
+            _ => "com_basegame",
+        };
+        for (name, value) in [(name, home.path().to_str().unwrap()), (base, "base")] {
+            options.cvars.push((name.to_owned(), value.to_owned()));
+        }
+        drop(Engine::start(options).unwrap());
+        assert!(
+            home.path().join("base/relight/pipelines.cache").is_file(),
+            "{name}"
+        );
+    }
 }
 
 #[test]
