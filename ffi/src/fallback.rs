@@ -5,6 +5,7 @@
 
 use crate::abi::functions::Shutdown;
 use crate::engine::{Engine, FrontEnd, MainThread};
+use crate::system;
 use libloading::Library;
 use std::cell::UnsafeCell;
 use std::ffi::{c_int, c_void};
@@ -53,55 +54,16 @@ fn file_names(front: &FrontEnd) -> Vec<String> {
         .collect()
 }
 
-/// This library's file.
-#[cfg(unix)]
-pub fn own_file() -> Option<PathBuf> {
-    use std::ffi::{CStr, OsStr, c_char, c_void};
-    use std::os::unix::ffi::OsStrExt;
-
-    #[repr(C)]
-    struct DlInfo {
-        file_name: *const c_char,
-        base: *mut c_void,
-        symbol_name: *const c_char,
-        symbol: *mut c_void,
-    }
-    unsafe extern "C" {
-        fn dladdr(address: *const c_void, info: *mut DlInfo) -> c_int;
-    }
-    let mut info = DlInfo {
-        file_name: std::ptr::null(),
-        base: std::ptr::null_mut(),
-        symbol_name: std::ptr::null(),
-        symbol: std::ptr::null_mut(),
-    };
-    // SAFETY: the address is one of ours; the system fills the structure.
-    let known = unsafe { dladdr(crate::GetRefAPI as *const c_void, &mut info) } != 0
-        && !info.file_name.is_null();
-    // SAFETY: a string of the dynamic loader.
-    let file = known.then(|| unsafe { CStr::from_ptr(info.file_name) })?;
-    Some(PathBuf::from(OsStr::from_bytes(file.to_bytes())))
-}
-
-/// This library's file.
-#[cfg(not(unix))]
-pub fn own_file() -> Option<PathBuf> {
-    None
-}
-
-/// The folder of this library's file.
-fn own_folder() -> Option<PathBuf> {
-    own_file()?.parent().map(PathBuf::from)
-}
-
 /// Folders to search, in order, each once.
 fn folders(front: &FrontEnd) -> Vec<PathBuf> {
-    let program = std::env::args_os()
-        .next()
-        .and_then(|program| PathBuf::from(program).parent().map(PathBuf::from));
+    let folder_of = |file: PathBuf| file.parent().map(PathBuf::from);
+    let own = system::own_file().and_then(folder_of);
+    let program = std::env::args_os().next().map(PathBuf::from);
     let mut list: Vec<PathBuf> = Vec::new();
-    let installed = front.folders.iter().map(PathBuf::from);
-    for folder in [own_folder(), program]
+    // On Windows anyone may create these folders.
+    let installed = front.folders.iter().filter(|_| cfg!(unix));
+    let installed = installed.map(PathBuf::from);
+    for folder in [own, program.and_then(folder_of)]
         .into_iter()
         .flatten()
         .chain(installed)
@@ -290,8 +252,9 @@ mod tests {
     #[test]
     fn our_own_folder_is_searched_first() {
         let folders = folders(FRONT_ENDS[0]);
-        assert_eq!(folders.first(), own_folder().as_ref());
+        let own = system::own_file().unwrap();
+        assert_eq!(folders.first().map(PathBuf::as_path), own.parent());
         let installed = PathBuf::from(FRONT_ENDS[0].folders[0]);
-        assert!(folders.contains(&installed));
+        assert_eq!(folders.contains(&installed), cfg!(unix));
     }
 }

@@ -7,7 +7,7 @@
 //! # The contract with the engine
 //! - One exported symbol, [`GetRefAPI`]. Everything runs on the thread that called it; calls on other threads are
 //!   refused.
-//! - The library stays mapped after the engine unloads it (`-z nodelete`), because code that has run a thread cannot be
+//! - The library stays mapped after the engine unloads it (`-z nodelete`, on Windows `system::pin`), because code that has run a thread cannot be
 //!   unmapped safely. Statics therefore outlive an unload, and each `GetRefAPI` resets all state. No thread outlives a
 //!   call.
 //! - The engine is recognized before any service but `Printf` is called (`recognize`): engines have the same version
@@ -58,6 +58,7 @@ mod recognize;
 mod scene;
 mod session;
 mod speeds;
+mod system;
 mod window;
 
 use std::ffi::{c_int, c_void};

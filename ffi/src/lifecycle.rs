@@ -36,16 +36,15 @@ fn wanted_device(cvars: &Cvars) -> Option<String> {
 
 /// Our folder in the game's writable folder, for light calibrations and pipeline caches.
 fn cache_folder(engine: Engine) -> Option<PathBuf> {
-    let first = |names: &[&CStr]| {
-        let mut values = names.iter().map(|name| engine.cvar_text(name));
-        values.find(|value| !value.is_empty())
-    };
+    let set = |name: &&CStr| !engine.cvar_text(name).is_empty();
     // newer engines have folders for data and state in place of one home
-    let home = first(&[c"fs_homepath", c"fs_homestatepath", c"fs_homedatapath"])?;
-    let game = first(&[c"fs_game", engine.front_end()?.base_game])?;
+    let homes = [c"fs_homepath", c"fs_homestatepath", c"fs_homedatapath"];
+    let home = engine.cvar_path(engine.cvar_get(homes.into_iter().find(set)?, c"", 0)?);
+    let games = [c"fs_game", engine.front_end()?.base_game];
+    let game = engine.cvar_text(games.into_iter().find(set)?);
     // a game folder is a single name; other values are not used as a path
     let plain = !game.contains(['/', '\\', ':']) && !game.contains("..");
-    plain.then(|| PathBuf::from(home).join(game).join("relight"))
+    plain.then(|| home.join(game).join("relight"))
 }
 
 /// `re.BeginRegistration`.

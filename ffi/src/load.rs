@@ -2,7 +2,7 @@
 
 use crate::abi::functions::Printf;
 use crate::engine::{self, Table};
-use crate::{fallback, lifecycle, logging, recognize, session, window};
+use crate::{fallback, lifecycle, logging, recognize, session, system, window};
 use std::ffi::{c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr;
@@ -48,6 +48,7 @@ pub unsafe fn get_ref_api(api_version: c_int, imports: *const c_void) -> *const 
         .front_end()
         .map_or(ptr::null(), |front| (front.exports)());
     logging::install();
+    system::pin();
     let prepared = catch_unwind(AssertUnwindSafe(|| {
         if session::is_kept() {
             return Ok(());

@@ -9,11 +9,11 @@
 //!    property of its engine ([`FrontEnd::recognizes`]).
 //!
 //! In 2 to 4 the entries of the table must be functions or null, and no functions may follow far beyond its end. A test
-//! whose data cannot be read (no `/proc`, an unreadable file) is skipped.
+//! whose data cannot be read (an unreadable file, on Unix no `/proc`) is skipped.
 
 use crate::engine::{Engine, FrontEnd};
-use crate::fallback;
 use crate::front_ends::{FRONT_ENDS, UNSUPPORTED};
+use crate::system;
 use std::ffi::c_void;
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -56,7 +56,7 @@ pub unsafe fn recognize(imports: *const c_void) -> Result<Engine, String> {
         // SAFETY: the player says that it is this engine's table; the rest is this function's contract.
         return Ok(unsafe { (front.install)(imports) });
     }
-    let code = code_ranges();
+    let code = system::code();
     match by_file_name().or_else(executable) {
         Some(Found::Supported(front)) => match odd_table(front, imports, &code) {
             Some(odd) => Err(refusal(
@@ -119,7 +119,7 @@ fn named(name: &str) -> Option<&'static FrontEnd> {
 
 /// The engine that loads renderers of this library's file name.
 fn by_file_name() -> Option<Found> {
-    let file = fallback::own_file()?;
+    let file = system::own_file()?;
     loads(&file.file_name()?.to_string_lossy())
 }
 
@@ -188,39 +188,12 @@ fn odd_words(front: &FrontEnd, words: &[usize], code: &[Range<usize>]) -> Option
     })
 }
 
-/// Address ranges of the process that hold code; empty if they cannot be read.
-fn code_ranges() -> Vec<Range<usize>> {
-    let maps = std::fs::read("/proc/self/maps").unwrap_or_default();
-    code_in(&String::from_utf8_lossy(&maps))
-}
-
-/// The executable ranges of `/proc/self/maps`.
-fn code_in(maps: &str) -> Vec<Range<usize>> {
-    let range = |line: &str| {
-        let (addresses, rest) = line.split_once(' ')?;
-        let (start, end) = addresses.split_once('-')?;
-        let number = |text| usize::from_str_radix(text, 16).ok();
-        let executable = rest.split(' ').next()?.contains('x');
-        executable.then_some(number(start)?..number(end)?)
-    };
-    maps.lines().filter_map(range).collect()
-}
-
-/// The words at an address, as far as they are readable; read through the kernel, because they may be unmapped.
-#[cfg(unix)]
+/// The words at an address, as far as they are readable.
 fn words_at(address: usize, count: usize) -> Vec<usize> {
-    use std::os::unix::fs::FileExt;
     let mut bytes = vec![0; count * size_of::<usize>()];
-    let read = std::fs::File::open("/proc/self/mem")
-        .and_then(|memory| memory.read_at(&mut bytes, address as u64))
-        .unwrap_or(0);
+    let read = system::read_memory(address, &mut bytes);
     let (words, _) = bytes.get(..read).unwrap_or_default().as_chunks();
     words.iter().copied().map(usize::from_ne_bytes).collect()
-}
-
-#[cfg(not(unix))]
-fn words_at(_address: usize, _count: usize) -> Vec<usize> {
-    Vec::new()
 }
 
 #[cfg(test)]
@@ -328,39 +301,5 @@ mod tests {
                 "{at} {word}"
             );
         }
-    }
-
-    #[test]
-    fn executable_mappings_are_code() {
-        let maps = "\
-55d0a0000000-55d0a0001000 r--p 00000000 fe:01 1234   /usr/lib/ioquake3/ioquake3
-55d0a0001000-55d0a0003000 r-xp 00001000 fe:01 1234   /usr/lib/ioquake3/ioquake3
-nonsense
-7ffd00000000-7ffd00021000 rw-p 00000000 00:00 0      [stack]
-ffffffffff600000-ffffffffff601000 --xp 00000000 00:00 0 [vsyscall]";
-        assert_eq!(
-            code_in(maps),
-            [
-                0x55d0_a000_1000..0x55d0_a000_3000,
-                0xffff_ffff_ff60_0000..0xffff_ffff_ff60_1000
-            ]
-        );
-        assert!(code_in("").is_empty());
-    }
-
-    #[test]
-    #[cfg(target_os = "linux")]
-    fn own_code_and_stack_are_readable() {
-        let function = code_in as *const ();
-        let code = code_ranges();
-        assert!(code.iter().any(|range| range.contains(&function.addr())));
-        let words = [1usize, 2, 3];
-        assert!(
-            !code
-                .iter()
-                .any(|range| range.contains(&words.as_ptr().addr()))
-        );
-        assert_eq!(words_at(words.as_ptr().addr(), 3), words);
-        assert_eq!(words_at(0, 3), [0usize; 0]);
     }
 }

@@ -8,7 +8,9 @@ use super::{
     valid_path_to_write,
 };
 use crate::abi::{CIN_MATERIAL, EXEC_APPEND, QBool};
+use crate::system;
 use std::ffi::{CStr, CString, c_char, c_float, c_int, c_uchar, c_void};
+use std::path::PathBuf;
 use std::ptr::{self, NonNull};
 
 /// Passes the pieces of `text` to `f`, each short enough for the engine's print buffer and NUL-terminated.
@@ -126,6 +128,12 @@ impl Engine {
         // SAFETY: a member of a variable of the engine, which only this thread changes; its text is NUL-terminated and
         // is copied before any change.
         unsafe { string_from(*self.member(cvar, |layout| layout.string)) }
+    }
+
+    /// The value as a path of the file system.
+    pub fn cvar_path(self, cvar: Variable) -> PathBuf {
+        // SAFETY: as for `cvar_string`.
+        unsafe { system::path_from(*self.member(cvar, |layout| layout.string)) }
     }
 
     /// Whether the value has changed since [`Engine::cvar_seen`].

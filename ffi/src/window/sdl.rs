@@ -157,7 +157,13 @@ fn open() -> Result<Library, SdlError> {
     }
     #[cfg(windows)]
     {
-        // LoadLibrary returns the copy that the engine has loaded.
+        use libloading::os::windows::Library as WindowsLibrary;
+        // ioquake3 named its 64-bit copy SDL264.dll until July 2025.
+        for name in [SDL_NAME, "SDL264.dll"] {
+            if let Ok(library) = WindowsLibrary::open_already_loaded(name) {
+                return Ok(library.into());
+            }
+        }
         // SAFETY: SDL's initialisers are safe at load time.
         unsafe { Library::new(SDL_NAME) }.map_err(|e| SdlError::NoLibrary(e.to_string()))
     }

@@ -38,7 +38,8 @@ pub(crate) fn pin_drivers(function: vk::PFN_vkQueueSubmit) {
     }
 }
 
-/// On other systems the loader manages drivers.
+/// On other systems the loader manages drivers. Windows has no such limit: it allocates the thread-local storage of a
+/// library when it loads it.
 #[cfg(not(unix))]
 pub(crate) fn pin_drivers(_function: vk::PFN_vkQueueSubmit) {}
 
