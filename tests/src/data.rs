@@ -2,6 +2,7 @@
 //! skipped, and fails instead when `RELIGHT_REQUIRE_DATA=1` (data, tools) or `RELIGHT_REQUIRE_GPU=1` (a Vulkan device)
 //! requires it.
 
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
@@ -45,7 +46,8 @@ fn find_library() -> PathBuf {
     }
     let status = build.status().expect("cargo runs");
     assert!(status.success(), "cargo build -p ffi failed");
-    let library = profile.join("librelight_ffi.so");
+    let file = format!("{DLL_PREFIX}relight_ffi{DLL_SUFFIX}");
+    let library = profile.join(file);
     assert!(library.is_file(), "cargo built no {}", library.display());
     library
 }

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 
-use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
+use libloading::Library;
 use tempfile::TempDir;
 use thiserror::Error;
 
@@ -379,9 +379,8 @@ impl Engine {
             Source::Linked(entry) => *entry,
             Source::Library(path) => {
                 let failed = |e| LoadError::Library(path.clone(), e);
-                // SAFETY: the library's initializers are those of a Rust cdylib; the linker flags are the engine's.
-                let library =
-                    unsafe { Library::open(Some(path), RTLD_NOW | RTLD_LOCAL) }.map_err(failed)?;
+                // SAFETY: the library's initializers are those of a Rust cdylib.
+                let library = unsafe { Library::new(path) }.map_err(failed)?;
                 // SAFETY: the symbol has this signature by the engine's interface.
                 let entry = *unsafe { library.get::<GetRefAPI>(b"GetRefAPI\0") }.map_err(failed)?;
                 self.library = Some(library);

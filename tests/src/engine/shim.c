@@ -1,5 +1,6 @@
 /* The part of the stand-in engine that has to be C: variadic messages, and errors that leave the renderer by
-   longjmp, over whatever frames lie between, exactly as the real engine's do. */
+   longjmp, over whatever frames lie between, exactly as the real engine's do. On Windows longjmp unwinds these
+   frames. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -26,7 +27,7 @@ int stand_in_call(void (*thunk)(void *), void *argument) {
     struct frame here;
     here.outer = innermost;
     innermost = &here;
-    if (_setjmp(here.place) == 0) {
+    if (setjmp(here.place) == 0) {
         thunk(argument);
         innermost = here.outer;
         return -1;
@@ -59,5 +60,5 @@ void stand_in_raise(int level, const char *format, ...) {
     stand_in_error(level, text);
     /* stand_in_error called the renderer again; those calls are over */
     innermost = to;
-    _longjmp(to->place, 1);
+    longjmp(to->place, 1);
 }

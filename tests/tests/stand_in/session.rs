@@ -2,6 +2,7 @@
 
 use super::support::{engine, engine_in_map, for_every_engine, options};
 use glam::Vec3;
+use std::path::Path;
 use tests::engine::abi::refEntity_t;
 use tests::engine::{Engine, LoadError, Options, Tables, View};
 use tests::maps::{HERE, ROOMS};
@@ -21,6 +22,32 @@ fn text(characters: &[std::ffi::c_char]) -> String {
         .take_while(|&&c| c != 0)
         .map(|&c| char::from(c as u8))
         .collect()
+}
+
+/// Whether the library is in memory.
+#[cfg(unix)]
+fn is_loaded(library: &Path) -> bool {
+    let (Ok(file), Ok(maps)) = (
+        library.canonicalize(),
+        std::fs::read_to_string("/proc/self/maps"),
+    ) else {
+        return false;
+    };
+    maps.lines()
+        .any(|line| line.ends_with(&*file.to_string_lossy()))
+}
+
+#[cfg(windows)]
+fn is_loaded(library: &Path) -> bool {
+    library
+        .file_name()
+        .is_some_and(|name| libloading::os::windows::Library::open_already_loaded(name).is_ok())
+}
+
+#[test]
+fn the_library_stays_in_memory() {
+    drop(engine());
+    assert!(is_loaded(&tests::data::library()));
 }
 
 fn the_configuration_is_filled() {
