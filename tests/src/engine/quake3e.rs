@@ -4,19 +4,26 @@ use std::ffi::{c_char, c_int, c_long, c_uchar, c_void};
 use std::ptr;
 use std::sync::OnceLock;
 
-use libloading::os::unix::Library;
+use libloading::Library;
 
 use super::abi::{cvar_t, glconfig_t};
 use super::imports::{self, text, violation, with};
 
 type GetInstanceProcAddr = unsafe extern "C" fn(*mut c_void, *const c_char) -> *mut c_void;
 
+/// File of the system's Vulkan loader.
+const LOADER_FILE: &str = if cfg!(windows) {
+    "vulkan-1.dll"
+} else {
+    "libvulkan.so.1"
+};
+
 /// `vkGetInstanceProcAddr` of the system's loader, which stays in memory.
 fn loader() -> Option<GetInstanceProcAddr> {
     static LOADER: OnceLock<Option<GetInstanceProcAddr>> = OnceLock::new();
     *LOADER.get_or_init(|| {
         // SAFETY: the Vulkan loader, whose initializers are safe at load time.
-        let library = unsafe { Library::new("libvulkan.so.1") }.ok()?;
+        let library = unsafe { Library::new(LOADER_FILE) }.ok()?;
         // SAFETY: the loader's function has this type.
         let function =
             *unsafe { library.get::<GetInstanceProcAddr>(b"vkGetInstanceProcAddr\0") }.ok()?;
