@@ -132,7 +132,7 @@ unsafe fn load_from(
                 continue;
             }
             engine.say(&format!("Relight: using {} instead\n", path.display()));
-            // SAFETY: not null, so it is the renderer's static table, which lives as long as its library; its first
+            // SAFETY: not null, so it is the renderer's static table, which is valid as long as its library is loaded; its first
             // entry is `Shutdown`.
             let theirs = unsafe { exports.cast::<Shutdown>().read_unaligned() };
             *substitute() = Some(Substitute {

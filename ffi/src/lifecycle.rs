@@ -82,6 +82,7 @@ pub unsafe extern "C" fn begin_registration(out: *mut glconfig_t) {
 
         session::with(|session| {
             let front = &mut session.front;
+            front.kept = false;
             let Some(renderer) = &mut session.renderer else {
                 return Ok(());
             };
@@ -237,7 +238,7 @@ pub fn end(ending: Ending) {
         // The buffer of a video frame may be invalid by now.
         front.captures.video = None;
         let mut outbox = Outbox::default();
-        outbox.lines.extend(give_up_still(renderer, front));
+        outbox.lines.extend(abandon_still(renderer, front));
         take_captures(renderer, front, &mut outbox).map(|()| outbox)
     }) {
         deliver(engine, outbox);
@@ -389,7 +390,7 @@ fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Fa
 }
 
 /// Drops an accumulated picture at the end of the game; returns a message for the player.
-fn give_up_still(renderer: &Renderer, front: &mut Front) -> Option<String> {
+fn abandon_still(renderer: &Renderer, front: &mut Front) -> Option<String> {
     let shot = front.captures.still.take()?;
     let (done, wanted) = renderer.still_progress()?;
     Some(format!(

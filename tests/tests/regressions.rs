@@ -1,4 +1,4 @@
-//! The files of `regressions/`, each of which once broke a reader.
+//! Every file of `regressions/` must be read or refused. Each breaks a reader that lacks a check.
 
 #![forbid(unsafe_code)]
 

@@ -50,7 +50,7 @@ pub mod cvar_flags {
 /// Limit of game paths, bytes, including the NUL.
 pub const MAX_QPATH: usize = 64;
 
-/// A console variable of the engine. Only the front end of that engine knows its type.
+/// A console variable of the engine. The front end of that engine defines its type.
 #[derive(Clone, Copy, Debug)]
 pub struct Variable(NonNull<c_void>);
 
@@ -97,8 +97,8 @@ pub struct FrontEnd {
     /// Text that only this engine's executable contains, spelled backwards, so that a program linked with this library
     /// does not contain it.
     pub marker: Option<&'static str>,
-    /// Whether the installed table is this engine's. Called for engines without a file name or a marker of their own,
-    /// all of which have `Cvar_Get`, `Cvar_VariableIntegerValue` and the first members of a variable in the same places.
+    /// Whether the installed table is this engine's. Called for engines without a file name or a marker of their own.
+    /// These engines have `Cvar_Get`, `Cvar_VariableIntegerValue` and the first members of a variable in the same places.
     pub recognizes: Option<fn(Engine) -> bool>,
     /// Entries of its table of services.
     pub services: usize,

@@ -82,9 +82,9 @@ impl Engine {
     /// Finds or makes a variable; applies its latched value. `None` if the engine has no such service.
     pub fn cvar_get(self, name: &CStr, default: &CStr, flags: c_int) -> Option<Variable> {
         let get = self.get(|t| t.cvar_get)?;
-        // SAFETY: both strings live through the call; the engine copies them.
+        // SAFETY: both strings are valid during the call; the engine copies them.
         let cvar = unsafe { get(name.as_ptr(), default.as_ptr(), flags) };
-        // The engine keeps its variables for as long as the process lives.
+        // The engine keeps its variables until the process ends.
         NonNull::new(cvar).map(Variable)
     }
 
@@ -100,7 +100,7 @@ impl Engine {
             return;
         };
         if let Some(f) = self.get(|t| t.cvar_set) {
-            // SAFETY: both strings live through the call; the engine copies them.
+            // SAFETY: both strings are valid during the call; the engine copies them.
             unsafe { f(name.as_ptr(), value.as_ptr()) }
         }
     }
@@ -168,7 +168,7 @@ impl Engine {
 
     /// Integer value of any variable; 0 if there is none.
     pub fn cvar_integer(self, name: &CStr) -> c_int {
-        // SAFETY: the name lives through the call.
+        // SAFETY: the name is valid during the call.
         self.get(|t| t.cvar_variable_integer_value)
             .map_or(0, |f| unsafe { f(name.as_ptr()) })
     }
@@ -184,7 +184,7 @@ impl Engine {
     /// Removes a console command, if it exists.
     pub fn remove_command(self, name: &CStr) {
         if let Some(f) = self.get(|t| t.cmd_remove_command) {
-            // SAFETY: the name lives through the call.
+            // SAFETY: the name is valid during the call.
             unsafe { f(name.as_ptr()) }
         }
     }
@@ -264,7 +264,7 @@ impl Engine {
             return Vec::new();
         };
         let mut count: c_int = 0;
-        // SAFETY: both strings live through the call; the engine stores the count.
+        // SAFETY: both strings are valid during the call; the engine stores the count.
         let names = unsafe { list(directory.as_ptr(), extension.as_ptr(), &mut count) };
         if names.is_null() {
             return Vec::new();
@@ -290,21 +290,21 @@ impl Engine {
         ) else {
             return false;
         };
-        // SAFETY: name and contents live through the call.
+        // SAFETY: name and contents are valid during the call.
         unsafe { f(name.as_ptr(), contents.as_ptr().cast(), length) };
         self.home_file_exists(&name)
     }
 
     /// Whether the user's game folder contains this file (packs are not searched).
     pub fn home_file_exists(self, name: &CStr) -> bool {
-        // SAFETY: the name lives through the call.
+        // SAFETY: the name is valid during the call.
         self.get(|t| t.fs_file_exists)
             .is_some_and(|f| unsafe { f(name.as_ptr()) } != 0)
     }
 
     /// Starts a video for a material. `None` if it cannot be played.
     pub fn play_cinematic(self, name: &CStr) -> Option<c_int> {
-        // SAFETY: the name lives through the call. The size matters only for videos that the engine draws itself.
+        // SAFETY: the name is valid during the call. The size matters only for videos that the engine draws itself.
         let handle = self
             .get(|t| t.cin_play_cinematic)
             .map(|f| unsafe { f(name.as_ptr(), 0, 0, 256, 256, CIN_MATERIAL) })?;

@@ -515,7 +515,7 @@ impl Window {
         }
     }
 
-    /// Present drawable size, pixels; `None` if the engine alone knows it.
+    /// Present drawable size, pixels; `None` for a window of the engine, which does not report it.
     pub fn drawable_size(&self) -> Option<(u32, u32)> {
         match self.owner {
             // SAFETY: SDL reads the size of a window that is open: whoever has a `Window` got it from `current` or

@@ -45,7 +45,7 @@ impl Residual {
 }
 
 /// Compares light at about `options.samples` positions chosen by `options.seed`. Another seed than that of the fit
-/// gives other positions, a few of which may have been fitted. Empty for worlds without stored light.
+/// gives other positions; a few of them may have been fitted. Empty for worlds without stored light.
 ///
 /// The world's [materials must be measured](RelitWorld::measure_materials), which loading for calibration does.
 pub fn residuals(world: &RelitWorld, options: &CalibrationOptions) -> Vec<Residual> {

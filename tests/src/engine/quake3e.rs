@@ -1,6 +1,6 @@
 //! The services that Quake3e alone offers, or with other types. Its window has a Vulkan surface without a display.
 
-use std::ffi::{c_char, c_int, c_long, c_uchar, c_void};
+use std::ffi::{CStr, c_char, c_int, c_long, c_uchar, c_void};
 use std::ptr;
 use std::sync::OnceLock;
 
@@ -194,6 +194,35 @@ pub(super) extern "C" fn instance_function(
 ) -> *mut c_void {
     // SAFETY: the arguments are those of the loader's function.
     loader().map_or(ptr::null_mut(), |get| unsafe { get(instance, name) })
+}
+
+/// Whether the Vulkan loader offers `VK_EXT_headless_surface`, without which this engine has no surface.
+pub fn has_surfaces() -> bool {
+    /// `VkExtensionProperties`.
+    #[repr(C)]
+    #[derive(Clone, Copy)]
+    struct Extension {
+        name: [c_char; 256],
+        _version: u32,
+    }
+    type Enumerate = unsafe extern "C" fn(*const c_char, *mut u32, *mut Extension) -> c_int;
+    let name = c"vkEnumerateInstanceExtensionProperties".as_ptr();
+    let function = instance_function(ptr::null_mut(), name);
+    if function.is_null() {
+        return false;
+    }
+    // SAFETY: the function of that name has this type.
+    let enumerate = unsafe { std::mem::transmute::<*mut c_void, Enumerate>(function) };
+    let mut found = [Extension {
+        name: [0; 256],
+        _version: 0,
+    }; 256];
+    let mut count = found.len() as u32;
+    // SAFETY: room for `count` structures, whose number the loader returns. Negative results are errors.
+    let failed = unsafe { enumerate(ptr::null(), &mut count, found.as_mut_ptr()) } < 0;
+    let mut found = found.iter().take(count as usize).filter(|_| !failed);
+    // SAFETY: names are NUL-terminated.
+    found.any(|e| unsafe { CStr::from_ptr(e.name.as_ptr()) } == c"VK_EXT_headless_surface")
 }
 
 /// A surface of `VK_EXT_headless_surface`.
