@@ -7,7 +7,7 @@ use shaders::types::Instance;
 use crate::assets::Assets;
 use crate::gpu::{self, ColorMask, Image, Recorder};
 use crate::raster::{
-    Aids, DrawList, FlareTest, Flares, Overlay, Raster, StageContext, Statics, Target,
+    Aids, DrawList, FlareTest, Flares, Overlay, PixelLights, Raster, StageContext, Statics, Target,
     ViewParameters, overlay_instance, window_to_clip,
 };
 use crate::scene::{ClassicScene, TracedScene, ViewScene};
@@ -115,6 +115,7 @@ impl<'a> FrameContext<'a> {
             samplers: &assets.samplers,
             identity_light: self.settings.identity_light(),
             light_spot: assets.textures.dynamic_light(),
+            pixel_lights: PixelLights::new(self.settings),
             only_texture: self
                 .settings
                 .no_bind

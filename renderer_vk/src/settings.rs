@@ -88,6 +88,8 @@ settings! { variables {
     round_images_down: bool = "r_roundImagesDown", "1", ARCHIVE | LATCH, None, Frame, GoesOn, "1 shrinks textures of odd sizes to a power of two, 0 enlarges them.";
     color_mip_levels: bool = "r_colorMipLevels", "0", LATCH, None, Frame, GoesOn, "1 tints smaller mip levels red, green and blue in turn.";
     simple_mip_maps: bool = "r_simpleMipMaps", "1", ARCHIVE | LATCH, None, Frame, GoesOn, "1 averages 2x2 pixels for mip levels, 0 filters wider.";
+    fade_detail: bool = "r_detailFade", "0", ARCHIVE | LATCH, None, Frame, GoesOn, "1 fades mip levels of images under textures/detail/ and gfx/fx/detail/ to grey, and halves none of these images, as OpenArena's engine.";
+    own_specular: bool = "r_specMode", "0", ARCHIVE, None, Frame, GoesOn, "alphaGen lightingSpecular on models: 0 reflects a light at (-960, 1980, 96), 1 the light of the grid, as OpenArena's engine.";
     detail_textures: bool = "r_detailtextures", "1", ARCHIVE | LATCH, None, Frame, GoesOn, "0 leaves detail stages of materials out.";
     intensity: f32 = "r_intensity", "1", LATCH, written_back(1.0, f32::MAX), With("r_gamma"), GoesOn, "Multiplies textures; 1 or more.";
     gamma: f32 = "r_gamma", "1", ARCHIVE, written_back(0.5, 3.0), With("r_gamma"), GoesOn, "Brightness of the display, 0.5 to 3.";
@@ -110,6 +112,11 @@ settings! { variables {
     draw_sun: bool = "r_drawSun", "0", ARCHIVE, None, Frame, GoesOn, "1 draws the sun's disc in the sky.";
     dynamic_light: bool = "r_dynamiclight", "1", ARCHIVE, None, Frame, Restarts, "0 ignores lights of explosions, missiles and items.";
     dlight_backs: bool = "r_dlightBacks", "1", ARCHIVE, None, Frame, GoesOn, "0 keeps dynamic light off faces turned away from it.";
+    dlight_mode: u32 = "r_dlightMode", "0", ARCHIVE, kept(0.0, 2.0), Frame, GoesOn, "Dynamic lights of the classic look: 0 spots as in Quake III, 1 per pixel as in Quake3e, 2 the same on models, too.";
+    dlight_scale: f32 = "r_dlightScale", "0.5", ARCHIVE, kept(0.1, 1.0), Frame, GoesOn, "Multiplies the radius of dynamic lights with r_dlightMode 1 and 2.";
+    dlight_intensity: f32 = "r_dlightIntensity", "1", ARCHIVE, kept(0.1, 1.0), Frame, GoesOn, "Multiplies the colour of dynamic lights with r_dlightMode 1 and 2.";
+    dlight_specular_power: f32 = "r_dlightSpecPower", "8", ARCHIVE, kept(1.0, 32.0), Frame, GoesOn, "Exponent of the highlights of dynamic lights with r_dlightMode 1 and 2.";
+    dlight_specular: f32 = "r_dlightSpecColor", "-0.25", ARCHIVE, kept(-1.0, 1.0), Frame, GoesOn, "Reflectance of these highlights; negative: factor of the surface's texture.";
     face_plane_cull: bool = "r_facePlaneCull", "1", ARCHIVE, None, Frame, GoesOn, "0 draws flat surfaces that face away from the camera, too; they stay invisible.";
     rail_width: f32 = "r_railWidth", "16", ARCHIVE, None, Frame, GoesOn, "Diameter of the rings of a rail trail.";
     rail_core_width: f32 = "r_railCoreWidth", "6", ARCHIVE, None, Frame, GoesOn, "Half width of the core of a rail trail.";

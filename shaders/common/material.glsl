@@ -174,7 +174,8 @@ vec4 point_color(vec4 c, uint rgb_gen, uint alpha_gen, float portal_range, Insta
     case ALPHAGEN_VERTEX: c.a = p.color.a; break;
     case ALPHAGEN_ONE_MINUS_VERTEX: c.a = 1.0 - p.color.a; break;
     case ALPHAGEN_LIGHTING_SPECULAR: {
-        vec3 light = normalize(vec3(-960.0, 1980.0, 96.0) - p.position);
+        bool own = (instance.flags & INSTANCE_OWN_SPECULAR) != 0;
+        vec3 light = own ? instance.light_direction : normalize(vec3(-960.0, 1980.0, 96.0) - p.position);
         vec3 reflected = p.normal * (2.0 * dot(p.normal, light)) - light;
         float s = max(dot(reflected, normalize(instance.viewer - p.position)), 0.0);
         c.a = s * s * s * s;

@@ -80,10 +80,40 @@ vec4 onto(vec4 before, uint stage) {
 }
 #endif
 
+#ifdef MANY_STAGES
+// Light that the first stage's texture reflects: diffuse with a linear falloff of d^2/r^2, and a Blinn-Phong highlight
+// (Quake3e's `ARB_BuildDlightFP`). The vectors are not normalized, the normal neither: as there.
+vec3 pixel_light() {
+    vec3 to_light = in_color[0].xyz;
+    float falloff = 1.0 - dot(to_light, to_light) * in_flat_color[0].w;
+    if (falloff < 0.0) discard;
+    vec3 light = normalize(to_light);
+    vec3 view = normalize(in_color[1].xyz);
+    vec3 normal = in_color[2].xyz;
+    float diffuse = dot(normal, light);
+    float specular = dot(normal, normalize(light + view));
+    if (in_flat_color[1].w != 0.0) {
+        if (dot(normal, view) * diffuse < 0.0) discard; // light and camera on different sides
+        diffuse = abs(diffuse);
+        specular = abs(specular);
+    }
+    vec3 base = sample_stage(0).rgb;
+    float reflectance = in_flat_color[1].y;
+    vec3 highlight = reflectance > 0.0 ? vec3(reflectance) : base * -reflectance;
+    vec3 reflected = base * clamp(diffuse, 0.0, 1.0) + highlight * pow(clamp(specular, 0.0, 1.0), in_flat_color[1].z);
+    float in_fog = fog_factor(vec2(in_color[0].w, in_color[1].w)); // 0 without fog
+    return clamp(reflected * (1.0 - in_fog) * in_flat_color[0].rgb * falloff, 0.0, 1.0);
+}
+#endif
+
 void main() {
     if (CLIP != 0 && in_clip < 0.0) discard;
     if (MODE == DRAW_LIGHT) {
         out_color = vec4(in_color[0].rgb * sample_stage(0).rgb, 1.0);
+#ifdef MANY_STAGES
+    } else if (MODE == DRAW_PIXEL_LIGHT) {
+        out_color = vec4(pixel_light(), 1.0);
+#endif
     } else if (MODE == DRAW_FOG) {
         out_color = vec4(in_flat_color[0].rgb, sample_stage(0).a);
     } else {

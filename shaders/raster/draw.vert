@@ -34,6 +34,12 @@ vec2 fog_coordinates(uint number, vec3 world) {
     return vec2(s, t);
 }
 
+StagePoint stage_point(Draws draws, Vertices vertices, vec3 position, vec3 world) {
+    return StagePoint(position, vertices.at[gl_VertexIndex].normal, vertices.at[gl_VertexIndex].st,
+        vertices.at[gl_VertexIndex].lightmap, unpackUnorm4x8(vertices.at[gl_VertexIndex].color),
+        draws.at[gl_InstanceIndex].time, VIEW.identity_light, distance(VIEW.origin, world));
+}
+
 // Texture coordinates of stage `i`; the draw holds what all vertices share.
 vec2 texcoord(Draws draws, Instance instance, StagePoint point, uint i) {
     Stages stages = Stages(VIEW.materials.stages);
@@ -90,15 +96,28 @@ void main() {
         float m = height > light.radius ? 0.0 : height < light.radius * 0.5 ? 1.0 : 2.0 * (light.radius - height) / light.radius;
         if (VIEW.light_backs == 0 && dot(delta, vertices.at[gl_VertexIndex].normal) < 0.0) m = 0.0;
         out_color[0] = vec4(light.color * m, 1.0);
+    } else if (MODE == DRAW_PIXEL_LIGHT) {
+#ifdef MANY_STAGES
+        RasterLight light = RasterLights(VIEW.lights).at[draws.at[gl_InstanceIndex].light];
+        uint fog = draws.at[gl_InstanceIndex].fog;
+        vec2 in_fog = fog == 0 ? vec2(0.0) : fog_coordinates(fog, world);
+        out_color[0] = vec4(light.origin - world, in_fog.x);
+        out_color[1] = vec4(VIEW.origin - world, in_fog.y);
+        out_color[2] = vec4(axis * vertices.at[gl_VertexIndex].normal, 0.0);
+        vec4 parameters = draws.at[gl_InstanceIndex].colors[0];
+        out_flat_color[0] = vec4(light.color * parameters.x, 1.0 / (light.radius * light.radius));
+        out_flat_color[1] = parameters;
+        if ((TEXTURES & 1) != 0) {
+            out_uv[0].xy = texcoord(draws, instances.at[index], stage_point(draws, vertices, position, world), 0);
+        }
+#endif
     } else if (MODE == DRAW_FOG) {
         uint fog = draws.at[gl_InstanceIndex].fog;
         out_uv[0].xy = fog_coordinates(fog, world);
         out_flat_color[0] = vec4(Fogs(VIEW.fogs).at[fog - 1].color * VIEW.identity_light, 1.0);
     } else {
         Instance instance = instances.at[index];
-        StagePoint point = StagePoint(position, vertices.at[gl_VertexIndex].normal, vertices.at[gl_VertexIndex].st,
-            vertices.at[gl_VertexIndex].lightmap, unpackUnorm4x8(vertices.at[gl_VertexIndex].color),
-            draws.at[gl_InstanceIndex].time, VIEW.identity_light, distance(VIEW.origin, world));
+        StagePoint point = stage_point(draws, vertices, position, world);
         // unrolled by hand, so that arguments are constant for every compiler
         write_stage(draws, instance, point, 0);
 #ifdef MANY_STAGES

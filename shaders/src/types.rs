@@ -272,7 +272,8 @@ pub struct Draw {
     /// Combined `tcMod`s of each stage that are equal for all vertices:
     /// `s' = s m[0] + t m[2] + m[4]`, `t' = s m[1] + t m[3] + m[5]`.
     pub texcoords: [[f32; 6]; DRAW_STAGES],
-    /// Components of each stage's colour that are equal for all vertices; 1 for the others.
+    /// Components of each stage's colour that are equal for all vertices; 1 for the others. `DRAW_PIXEL_LIGHT`: factor of
+    /// the light's colour, highlight's reflectance (negative: factor of the texture), exponent, 1: faces have two sides.
     pub colors: [[f32; 4]; DRAW_STAGES],
     /// The material's time, seconds.
     pub time: f32,
@@ -280,7 +281,7 @@ pub struct Draw {
     pub instance: u32,
     /// Index of the fog volume plus one; 0: none.
     pub fog: u32,
-    /// Index of the dynamic light (`DRAW_LIGHT`).
+    /// Index of the dynamic light (`DRAW_LIGHT`, `DRAW_PIXEL_LIGHT`).
     pub light: u32,
     /// 1: the vertices are in `dynamic_vertices`.
     pub dynamic_vertices: u32,

@@ -29,6 +29,8 @@ pub(crate) static FRONT_END: FrontEnd = FrontEnd {
         ("r_fullscreen", "1"),
         ("r_mode", "-2"),
         ("r_textureMode", "GL_LINEAR_MIPMAP_NEAREST"),
+        ("r_detailFade", "1"),
+        ("r_specMode", "1"),
     ],
     owned: &[],
     scripts: &[],

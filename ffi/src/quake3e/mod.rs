@@ -33,6 +33,7 @@ pub(crate) static FRONT_END: FrontEnd = FrontEnd {
     folders: &[],
     base_game: c"fs_basegame",
     defaults: &[
+        ("r_dlightMode", "1"),
         ("r_flareFade", "10"),
         ("r_lodbias", "-2"),
         ("r_picmip", "0"),

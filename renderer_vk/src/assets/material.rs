@@ -3,6 +3,9 @@
 use shaders::types::Dielectric;
 use shaderscript::{AlphaGen, Cull, Deform, Fog, Shader, TcGen};
 
+/// `surfaceparm nodlight` and `surfaceparm sky`: surfaces without dynamic lights.
+pub const NO_DYNAMIC_LIGHT: u32 = 0x20000 | 0x4;
+
 /// Light source of a surface: part of a material's identity, as the engine's lightmap index is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum LightmapClass {
@@ -111,6 +114,8 @@ pub struct Material {
     pub stage_first: u32,
     /// Number of GPU stages.
     pub stage_count: u32,
+    /// GPU stage whose texture reflects dynamic lights that are evaluated per pixel.
+    pub light_stage: Option<u32>,
     /// Set for skies.
     pub sky: Option<SkyBox>,
     /// Fog parameters, for the materials of fog brushes.

@@ -15,6 +15,7 @@ use super::bind::{internal_shader, passes, sky_faces};
 use super::compile::{FOG_IMAGE, StageArrays, VideoClients, sampler};
 use super::dielectric;
 use super::flags;
+use super::light_stage;
 use super::material::{LightmapClass, Material, SkyBox, VideoStage};
 use super::material_buffers::Uploaded;
 use super::prepare::grey;
@@ -362,6 +363,8 @@ impl Materials {
             passes: passes(&shader, stage_first),
             stage_first,
             stage_count,
+            light_stage: light_stage::light_stage(&shader, sort)
+                .and_then(|stage| stage_first.checked_add(u32::try_from(stage).ok()?)),
             sky,
             fog: shader.fog,
             surface_flags: shader.surface_flags,

@@ -6,6 +6,7 @@ pub mod compile;
 mod dielectric;
 mod flags;
 mod fonts;
+mod light_stage;
 mod material;
 mod material_buffers;
 mod materials;
@@ -21,7 +22,7 @@ use std::sync::Arc;
 use relight::GameFiles;
 
 pub use fonts::LoadedFont;
-pub use material::{Combine, LightmapClass, Material, RasterPass};
+pub use material::{Combine, LightmapClass, Material, NO_DYNAMIC_LIGHT, RasterPass};
 pub use materials::{MaterialSettings, Materials};
 pub use models::{IqmModel, Md3Lod, MdrModel, Model, Models};
 pub use prepare::TextureSettings;

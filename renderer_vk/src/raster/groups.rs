@@ -22,12 +22,10 @@ use super::list::{
 use super::passes;
 use super::pipelines::{Depth, State};
 use super::shading::{Shading, StageContext};
-use crate::assets::{Material, RasterPass};
+use crate::assets::{Material, NO_DYNAMIC_LIGHT, RasterPass};
 use crate::scene::{ClassicScene, DrawSurface, Geometry};
 use shaderscript::sort;
 
-/// `surfaceparm nodlight` and `surfaceparm sky`: surfaces without dynamic lights.
-const NO_DYNAMIC_LIGHT: u32 = 0x20000 | 0x4;
 /// Most dynamic lights of a surface, as in the engine: one bit each.
 const MAX_LIGHTS: usize = 32;
 
@@ -304,7 +302,12 @@ impl DrawList {
         let Some(instance) = context.instance(group) else {
             return;
         };
-        if material.sort > sort::OPAQUE || material.surface_flags & NO_DYNAMIC_LIGHT != 0 {
+        let pixel_stage = match context.stages.pixel_lights {
+            Some(_) => material.light_stage,
+            None => None,
+        };
+        let spots = material.sort <= sort::OPAQUE && material.surface_flags & NO_DYNAMIC_LIGHT == 0;
+        if pixel_stage.is_none() && (context.stages.pixel_lights.is_some() || !spots) {
             return;
         }
         let (first, count) = group.surfaces;
@@ -314,7 +317,10 @@ impl DrawList {
             if lights & (1 << i) == 0 {
                 continue;
             }
-            let reach = LightReach::new(light, instance);
+            let reach = match pixel_stage {
+                Some(_) => LightReach::sphere(light, instance),
+                None => LightReach::spot(light, instance),
+            };
             let first_index = self.indices.len() as u32;
             for surface in surfaces.iter().filter(|s| s.dlights & (1 << i) != 0) {
                 let (vertices, indices) = match surface.geometry {
@@ -332,16 +338,32 @@ impl DrawList {
                 light: i,
                 ..plain_draw(group)
             };
-            let (shading, draw) = context.stages.light(draw);
+            let (shading, draw) = match pixel_stage {
+                Some(stage) => {
+                    let fog = fogged(material, draw.fog).map_or(0, |_| draw.fog);
+                    let draw = Draw { fog, ..draw };
+                    let lightmap = group.common.lightmap;
+                    (context.stages).pixel_light(material, stage, instance, lightmap, draw)
+                }
+                None => context.stages.light(draw),
+            };
+            let source = match pixel_stage {
+                Some(_) if material.sort < sort::OPAQUE => c::BLEND_DST_COLOR,
+                Some(_) => c::BLEND_ONE,
+                None => light_source_factor(light),
+            };
             let state = State {
-                blend: Some((light_source_factor(light), c::BLEND_ONE)),
+                blend: Some((source, c::BLEND_ONE)),
                 depth: Depth::Equal,
                 depth_write: false,
                 shading,
                 ..context.plain_state(material)
             };
             let call = self.call(state, group.range, span, draw);
-            self.lights.push(call);
+            match pixel_stage {
+                Some(_) => self.pixel_lights.push(call),
+                None => self.lights.push(call),
+            }
         }
     }
 

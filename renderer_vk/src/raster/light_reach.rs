@@ -12,23 +12,33 @@ pub struct LightReach {
     origin: Vec3,
     /// Transforms a point of the instance to coordinates along its axes.
     along_axes: Mat3,
-    radius: f32,
+    /// Half the size of the box around the light outside which it has no effect, units.
+    half: Vec3,
 }
 
 impl LightReach {
-    /// The light relative to an instance.
-    pub fn new(light: &DynamicLight, instance: &Instance) -> Self {
+    /// The spot of a light relative to an instance: a square column along the instance's z axis, as wide as the light's
+    /// radius and twice as high (`draw.vert`).
+    pub fn spot(light: &DynamicLight, instance: &Instance) -> Self {
+        Self::new(light, instance, Vec3::new(0.5, 0.5, 1.0) * light.radius)
+    }
+
+    /// The sphere of a light that is evaluated per pixel.
+    pub fn sphere(light: &DynamicLight, instance: &Instance) -> Self {
+        Self::new(light, instance, Vec3::splat(light.radius))
+    }
+
+    fn new(light: &DynamicLight, instance: &Instance, half: Vec3) -> Self {
         let axes = Mat3::from_cols_array_2d(&instance.axis.map(|axis| axis.to_array()));
         let onto = axes.transpose();
         Self {
             origin: onto * (light.origin - instance.origin),
             along_axes: onto * axes,
-            radius: light.radius,
+            half,
         }
     }
 
-    /// Appends the triangles of `indices` that the light may reach. The spot is a square column along the instance's z
-    /// axis, as wide as the light's radius and twice as high (`draw.vert`).
+    /// Appends the triangles of `indices` that the light may reach.
     pub fn gather(&self, vertices: &[Vertex], indices: &[u32], found: &mut Vec<u32>) {
         for corners in indices.chunks_exact(3) {
             let beyond = corners.iter().fold(u32::MAX, |all, &index| {
@@ -42,16 +52,10 @@ impl LightReach {
         }
     }
 
-    /// One bit for each side of the column beyond which a point lies.
+    /// One bit for each side of the box beyond which a point lies.
     fn beyond(&self, point: Vec3) -> u32 {
         let delta = self.origin - self.along_axes * point;
-        let half = self.radius * 0.5;
-        u32::from(delta.x < -half)
-            | u32::from(delta.x > half) << 1
-            | u32::from(delta.y < -half) << 2
-            | u32::from(delta.y > half) << 3
-            | u32::from(delta.z < -self.radius) << 4
-            | u32::from(delta.z > self.radius) << 5
+        delta.cmplt(-self.half).bitmask() | delta.cmpgt(self.half).bitmask() << 3
     }
 }
 
@@ -73,7 +77,7 @@ mod tests {
             axis: [Vec3::Y * 2.0, Vec3::NEG_X * 2.0, Vec3::Z * 2.0],
             ..Instance::default()
         };
-        let reach = LightReach::new(&light, &instance);
+        let reach = LightReach::spot(&light, &instance);
         let vertices = [
             // around the light
             vertex(0.0, -52.0, 0.0),
@@ -97,5 +101,9 @@ mod tests {
         reach.gather(&vertices, &indices, &mut found);
         // triangles with an index out of range are kept
         assert_eq!(found, [0, 1, 2, 6, 7, 8, 99, 3, 4]);
+        // the sphere is wider than the spot
+        found.clear();
+        LightReach::sphere(&light, &instance).gather(&vertices, &indices, &mut found);
+        assert_eq!(found, [0, 1, 2, 3, 4, 5, 6, 7, 8, 99, 3, 4]);
     }
 }

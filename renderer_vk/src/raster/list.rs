@@ -95,6 +95,8 @@ pub struct DrawList {
     pub(super) lights: Vec<Call>,
     /// Deferred calls of fog, drawn after the lights.
     pub(super) fog: Vec<Call>,
+    /// Deferred calls of lights that are evaluated per pixel, drawn before the first translucent surface.
+    pub(super) pixel_lights: Vec<Call>,
 }
 
 impl DrawList {
@@ -143,8 +145,15 @@ impl DrawList {
         for sky in &scene.look.skies {
             self.add_sky(sky, scene, stages, aids);
         }
+        let fog = rest.partition_point(|s| materials.get(s.material).sort < sort::FOG);
+        let (solid, translucent) = rest.split_at(fog);
         self.add_surfaces(&GroupContext {
-            surfaces: rest,
+            surfaces: solid,
+            ..context
+        });
+        self.calls.append(&mut self.pixel_lights);
+        self.add_surfaces(&GroupContext {
+            surfaces: translucent,
             ..context
         });
         if let Some(sun) = scene.sun.filter(|_| !scene.look.skies.is_empty()) {

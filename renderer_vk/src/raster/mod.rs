@@ -33,7 +33,7 @@ pub use flares::{FlareTest, Flares, window_to_clip};
 pub use list::{DrawList, Statics};
 pub use overlay::{Overlay, Picture2d, overlay_instance};
 pub use present::Present;
-pub use shading::StageContext;
+pub use shading::{PixelLights, StageContext};
 pub use target::Target;
 
 use crate::api::DynamicLight;

@@ -129,7 +129,8 @@ impl Pipelines {
         let depth_alone = state.shading.mode == c::DRAW_DEPTH;
         // smaller shaders compile faster
         let modified = state.shading.tc_mods != 0;
-        let many = state.shading.has_stages() || modified || target.counted;
+        let several_inputs = state.shading.mode == c::DRAW_PIXEL_LIGHT;
+        let many = state.shading.has_stages() || several_inputs || modified || target.counted;
         let vertex = if depth_alone {
             &shaders::RASTER_DRAW_VERT_DEPTH
         } else if modified {

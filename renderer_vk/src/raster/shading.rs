@@ -5,11 +5,12 @@ use glam::Vec2;
 use shaders::constant_ids::raster::draw as id;
 use shaders::types::constants as c;
 use shaders::types::{DRAW_STAGES, Draw, Instance};
-use shaderscript::{AlphaGen, RgbGen, TcMod, WaveFunction, eval};
+use shaderscript::{AlphaGen, Cull, RgbGen, TcMod, WaveFunction, eval};
 use support::slice;
 
 use crate::assets::compile::sampler;
 use crate::assets::{Combine, Material, Materials, RasterPass, Samplers};
+use crate::settings::Settings;
 
 /// Number of low bits of a handle in [`Draw::textures`] for the texture; the sampler is above.
 const TEXTURE_BITS: u32 = 24;
@@ -156,6 +157,33 @@ impl StageColor {
     };
 }
 
+/// Evaluation of dynamic lights per pixel, by Quake3e's `r_dlight*`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelLights {
+    /// Factor of the lights' colours.
+    pub scale: f32,
+    /// Reflectance of the highlight; negative: factor of the texture.
+    pub specular: f32,
+    /// Exponent of the highlight.
+    pub power: f32,
+}
+
+impl PixelLights {
+    /// By the settings; `None` with `r_dlightMode 0`.
+    pub fn new(settings: &Settings) -> Option<Self> {
+        let scale = if settings.ignore_hw_gamma {
+            2.0 * settings.intensity.powf(settings.gamma)
+        } else {
+            1.0
+        };
+        (settings.dlight_mode != 0).then_some(Self {
+            scale,
+            specular: settings.dlight_specular,
+            power: settings.dlight_specular_power,
+        })
+    }
+}
+
 /// Parameters for the evaluation of stages.
 #[derive(Clone, Copy)]
 pub struct StageContext<'a> {
@@ -167,6 +195,8 @@ pub struct StageContext<'a> {
     pub identity_light: f32,
     /// Texture of a dynamic light's spot.
     pub light_spot: u32,
+    /// Evaluation of dynamic lights per pixel; `None`: they are spots.
+    pub pixel_lights: Option<PixelLights>,
     /// Replaces every texture (`r_nobind`).
     pub only_texture: Option<u32>,
 }
@@ -184,8 +214,7 @@ impl StageContext<'_> {
         fog_adjust: u32,
         draw: Draw,
     ) -> (Shading, Draw) {
-        let clamp = material.shader.clamp_time.unwrap_or(f32::INFINITY);
-        let time = (instance.time - material.time_offset).min(clamp);
+        let time = material_time(material, instance);
         let mut draw = Draw { time, ..draw };
         let mut shading = Shading {
             fog_adjust,
@@ -210,19 +239,7 @@ impl StageContext<'_> {
             let index = pass.stages[part];
             draw.stages[place] = index;
             let script = script_stage(material, index);
-            let Some(stage) = slice::get(&self.materials.arrays().stages, index as usize) else {
-                continue;
-            };
-            if let Some(texture) = self.stage_texture(stage, lightmap, time) {
-                shading.textures |= 1 << place;
-                shading.tc_gen.set(place, stage.tc_gen);
-                draw.textures[place] = self.handle(texture, stage.sampler_index);
-                let tc_mods = script.map_or(&[][..], |s| &s.tc_mods);
-                match affine(tc_mods, seconds(time), instance.texcoord) {
-                    Some(matrix) => draw.texcoords[place] = matrix,
-                    None => shading.tc_mods |= 1 << place,
-                }
-            }
+            self.set_texture(place, script, instance, lightmap, &mut shading, &mut draw);
             let color = match (part, script) {
                 (0, Some(script)) => self.color(script, instance, time),
                 // a pass has the colour of its first stage
@@ -281,6 +298,59 @@ impl StageContext<'_> {
             Shading::LIGHT,
             self.textured(self.light_spot, sampler::CLAMP, draw),
         )
+    }
+
+    /// The draw of a dynamic light that is evaluated per pixel: the texture of one of the material's stages reflects it.
+    pub fn pixel_light(
+        &self,
+        material: &Material,
+        stage: u32,
+        instance: &Instance,
+        lightmap: u32,
+        draw: Draw,
+    ) -> (Shading, Draw) {
+        let mut shading = Shading {
+            mode: c::DRAW_PIXEL_LIGHT,
+            ..Shading::WHITE
+        };
+        let mut draw = Draw {
+            time: material_time(material, instance),
+            ..draw
+        };
+        draw.stages[0] = stage;
+        let script = script_stage(material, stage);
+        self.set_texture(0, script, instance, lightmap, &mut shading, &mut draw);
+        if let Some(lights) = self.pixel_lights {
+            let both_sides = f32::from(material.cull == Cull::None);
+            draw.colors[0] = [lights.scale, lights.specular, lights.power, both_sides];
+        }
+        (shading, draw)
+    }
+
+    /// Sets the texture of the stage at a place in the draw, and its texture coordinates.
+    fn set_texture(
+        &self,
+        place: usize,
+        script: Option<&shaderscript::Stage>,
+        instance: &Instance,
+        lightmap: u32,
+        shading: &mut Shading,
+        draw: &mut Draw,
+    ) {
+        let index = draw.stages[place];
+        let Some(stage) = slice::get(&self.materials.arrays().stages, index as usize) else {
+            return; // a material has its stages
+        };
+        if let Some(texture) = self.stage_texture(stage, lightmap, draw.time) {
+            shading.textures |= 1 << place;
+            shading.tc_gen.set(place, stage.tc_gen);
+            draw.textures[place] = self.handle(texture, stage.sampler_index);
+            let tc_mods = script.map_or(&[][..], |s| &s.tc_mods);
+            match affine(tc_mods, seconds(draw.time), instance.texcoord) {
+                Some(matrix) => draw.texcoords[place] = matrix,
+                None => shading.tc_mods |= 1 << place,
+            }
+        }
     }
 
     /// The draw of fog over a surface.
@@ -451,6 +521,12 @@ fn seconds(time: f32) -> f64 {
     let near = f64::from(time);
     let whole = (near * 1000.0).round() / 1000.0;
     if whole as f32 == time { whole } else { near }
+}
+
+/// Shader time of a material on an instance, seconds.
+fn material_time(material: &Material, instance: &Instance) -> f32 {
+    let clamp = material.shader.clamp_time.unwrap_or(f32::INFINITY);
+    (instance.time - material.time_offset).min(clamp)
 }
 
 /// The script's stage for a GPU stage.

@@ -73,6 +73,7 @@ impl Renderer {
             samplers: &assets.samplers,
             identity_light: self.settings.identity_light(),
             light_spot: assets.textures.dynamic_light(),
+            pixel_lights: raster::PixelLights::new(&self.settings),
             only_texture: None,
         };
         let surfaces = self.world.iter().flat_map(|world| &world.surfaces);

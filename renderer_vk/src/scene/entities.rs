@@ -122,7 +122,11 @@ impl Gatherer<'_> {
             self.input.world,
             self.world.is_some(),
             at,
-            self.lights,
+            if self.lights_models() {
+                &[]
+            } else {
+                self.lights
+            },
             self.input.settings,
         )
     }
@@ -139,12 +143,14 @@ impl Gatherer<'_> {
             let (ambient, directed) = (brightest(light.ambient), brightest(light.directed));
             log::info!("amb:{ambient}  dir:{directed}");
         }
-        let instance = count(out.instances.len());
+        let number = count(out.instances.len());
         let added = lighting::added(self.input.settings);
-        out.instances.push(entity::model_instance(
-            entity, &self.view, out.time, &light, added,
-        ));
-        instance
+        let mut instance = entity::model_instance(entity, &self.view, out.time, &light, added);
+        if self.input.settings.own_specular {
+            instance.flags |= c::INSTANCE_OWN_SPECULAR;
+        }
+        out.instances.push(instance);
+        number
     }
 
     pub(super) fn culls_box(&self, entity: &RefEntity, bounds: &Aabb) -> bool {
@@ -182,10 +188,17 @@ impl Gatherer<'_> {
             LookPartMut::Classic(classic) => {
                 let mut lights = std::mem::take(&mut self.scratch.lights);
                 surfaces::local_lights(self.lights, entity.origin, &entity.axis, &mut lights);
-                // If no light reaches the model's box, no surface is lit. Otherwise the engine keeps one bit for all
-                // lights: that of the view's first light.
-                let reached = surfaces::lights_at(&lights, &brush.bounds) != 0;
-                lights.truncate(usize::from(reached));
+                if self.input.settings.dlight_mode == 0 {
+                    // If no light reaches the model's box, no surface is lit. Otherwise the engine keeps one bit for
+                    // all lights: that of the view's first light.
+                    let reached = surfaces::lights_at(&lights, &brush.bounds) != 0;
+                    lights.truncate(usize::from(reached));
+                } else {
+                    // lights that are evaluated per pixel have no such faults
+                    for light in &mut lights {
+                        light.world = light.local;
+                    }
+                }
                 // the model's box was tested; its surfaces are culled by facing only
                 let placed = slice::get(&out.instances, instance as usize);
                 let local = LocalView {

@@ -21,7 +21,7 @@ use super::{
     ClassicScene, DynamicMesh, GatherInput, LookPartMut, MeshId, Scene, Shape, Sun, TracedScene,
     View, ViewEntity, ViewScene,
 };
-use crate::api::{DynamicLight, PolyVert, RefDef, RefEntity, rdflags, renderfx};
+use crate::api::{DynamicLight, EntityKind, PolyVert, RefDef, RefEntity, rdflags, renderfx};
 use crate::world::{VisibleQuery, VisibleSet, WorldData};
 
 /// Model number of the map in [`MeshId`]; handles of models are positive.
@@ -160,6 +160,16 @@ impl<'a> Gatherer<'a> {
         let settings = input.settings;
         let dynamic = settings.dynamic_light && !settings.vertex_light;
         let shows_world = def.flags & rdflags::NO_WORLD_MODEL == 0;
+        let per_pixel = settings.dlight_mode != 0;
+        if dynamic && !traced && per_pixel {
+            scene.pixel_lights.clear();
+            let scaled = scene.spots.iter().map(|light| DynamicLight {
+                radius: light.radius * settings.dlight_scale,
+                color: light.color * settings.dlight_intensity,
+                ..*light
+            });
+            scene.pixel_lights.extend(scaled);
+        }
         Self {
             input,
             entities: if settings.draw_entities {
@@ -171,6 +181,7 @@ impl<'a> Gatherer<'a> {
             poly_vertices: &scene.poly_vertices,
             lights: match (dynamic, traced) {
                 (false, _) => &[],
+                (true, false) if per_pixel => &scene.pixel_lights,
                 (true, false) => &scene.spots,
                 (true, true) => &scene.lights,
             },
@@ -494,6 +505,11 @@ impl<'a> Gatherer<'a> {
         )
     }
 
+    /// Whether dynamic lights are evaluated per pixel on models, too.
+    pub(super) fn lights_models(&self) -> bool {
+        self.input.settings.dlight_mode == 2 && !self.traced
+    }
+
     /// Finishes a mesh that is no world surface, and lists it for the classic look. `asked`: material before remapping,
     /// which decides the order.
     pub(super) fn finish_and_list(
@@ -508,7 +524,13 @@ impl<'a> Gatherer<'a> {
         if let (Some(mesh), LookPartMut::Classic(classic)) = (mesh, out.look.part()) {
             let rank = self.input.materials.rank(asked);
             let key = sort_key(rank, number, mesh.fog, false);
-            classic.push_mesh(&mesh, key, NO_TEXTURE, 0);
+            let model = entity.is_some_and(|entity| entity.kind == EntityKind::Model);
+            let lights = if self.lights_models() && model {
+                u32::MAX // the draw list keeps the triangles that each light reaches
+            } else {
+                0
+            };
+            classic.push_mesh(&mesh, key, NO_TEXTURE, lights);
         }
     }
 

@@ -343,6 +343,8 @@ pub struct Scene {
     lights: Vec<DynamicLight>,
     /// The same for the classic look: a light along a line as a row of spots.
     spots: Vec<DynamicLight>,
+    /// The spots with `r_dlightScale` and `r_dlightIntensity`, for lights that are evaluated per pixel.
+    pixel_lights: Vec<DynamicLight>,
     visible: VisibleSet,
     portal_visible: VisibleSet,
     classic_pool: Vec<ClassicScene>,

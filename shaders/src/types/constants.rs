@@ -120,6 +120,8 @@ pub const INSTANCE_UNLIT: u32 = 16;
 pub const INSTANCE_CROSSHAIR: u32 = 32;
 /// A sprite, lit by `ambient`; traced look only.
 pub const INSTANCE_SUSPENDED: u32 = 64;
+/// `alphaGen lightingSpecular` reflects the light of the grid, not the engine's constant one.
+pub const INSTANCE_OWN_SPECULAR: u32 = 128;
 
 /// A draw of a material's stage.
 pub const DRAW_STAGE: u32 = 0;
@@ -129,6 +131,8 @@ pub const DRAW_LIGHT: u32 = 1;
 pub const DRAW_FOG: u32 = 2;
 /// Depth only, before everything else.
 pub const DRAW_DEPTH: u32 = 3;
+/// A dynamic light that is evaluated per pixel.
+pub const DRAW_PIXEL_LIGHT: u32 = 4;
 /// Most stages of one draw.
 pub const DRAW_STAGES: u32 = 4;
 
