@@ -9,7 +9,6 @@ for_every_engine!(
     screenshots_are_files,
     captures_show_the_frame_in_which_they_were_asked_for,
     what_is_not_written_is_not_called_written,
-    costs_are_told_in_lines_and_as_json,
     video_frames_reach_the_writer,
 );
 
@@ -216,6 +215,8 @@ fn a_still_picture_is_made_beside_the_game() {
     engine.assert_clean();
 }
 
+// It uses no table of the engine that other tests do not use, and takes 55 s on two cores: one engine is enough.
+#[test]
 fn costs_are_told_in_lines_and_as_json() {
     let mut engine = engine_in_map();
     engine.set("r_rt", "1");
