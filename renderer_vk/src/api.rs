@@ -138,26 +138,9 @@ pub struct DynamicLight {
     pub color: Vec3,
     /// Added to surfaces instead of modulating them.
     pub additive: bool,
-    /// The other end of a light along a line; `None` for a light at a point.
+    /// The other end of a light along a line, which the classic look draws at `origin` alone; `None` for a light at a
+    /// point.
     pub end: Option<Vec3>,
-}
-
-impl DynamicLight {
-    /// Length of its line, units.
-    pub(crate) fn length(&self) -> f32 {
-        self.end.map_or(0.0, |end| end.distance(self.origin))
-    }
-
-    /// Places that stand for the light: the middles of equal parts of its line, at most `step` of its reach long, 16 at
-    /// most.
-    pub(crate) fn places(&self, step: f32) -> impl ExactSizeIterator<Item = Vec3> + use<> {
-        const MOST: f32 = 16.0;
-        let parts = (self.length() / (self.radius * step))
-            .ceil()
-            .clamp(1.0, MOST);
-        let (start, end) = (self.origin, self.end.unwrap_or(self.origin));
-        (0..parts as usize).map(move |i| start.lerp(end, (i as f32 + 0.5) / parts))
-    }
 }
 
 /// A piece of a decal clipped to the world (`markFragment_t`).

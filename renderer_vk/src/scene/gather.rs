@@ -163,7 +163,7 @@ impl<'a> Gatherer<'a> {
         let per_pixel = settings.dlight_mode != 0;
         if dynamic && !traced && per_pixel {
             scene.pixel_lights.clear();
-            let scaled = scene.spots.iter().map(|light| DynamicLight {
+            let scaled = scene.lights.iter().map(|light| DynamicLight {
                 radius: light.radius * settings.dlight_scale,
                 color: light.color * settings.dlight_intensity,
                 ..*light
@@ -182,8 +182,7 @@ impl<'a> Gatherer<'a> {
             lights: match (dynamic, traced) {
                 (false, _) => &[],
                 (true, false) if per_pixel => &scene.pixel_lights,
-                (true, false) => &scene.spots,
-                (true, true) => &scene.lights,
+                (true, _) => &scene.lights,
             },
             visible: if view.is_portal {
                 &mut scene.portal_visible

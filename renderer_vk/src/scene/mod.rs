@@ -341,9 +341,7 @@ pub struct Scene {
     polys: Vec<Poly>,
     poly_vertices: Vec<PolyVert>,
     lights: Vec<DynamicLight>,
-    /// The same for the classic look: a light along a line as a row of spots.
-    spots: Vec<DynamicLight>,
-    /// The spots with `r_dlightScale` and `r_dlightIntensity`, for lights that are evaluated per pixel.
+    /// The same with `r_dlightScale` and `r_dlightIntensity`, for lights that are evaluated per pixel.
     pixel_lights: Vec<DynamicLight>,
     visible: VisibleSet,
     portal_visible: VisibleSet,
@@ -365,7 +363,6 @@ impl Scene {
         self.polys.clear();
         self.poly_vertices.clear();
         self.lights.clear();
-        self.spots.clear();
     }
 
     /// Sets the eye of the following views.
@@ -409,10 +406,6 @@ impl Scene {
 
     /// Adds a dynamic light, unless its radius is 0.
     pub fn add_light(&mut self, light: DynamicLight) {
-        /// Spots of a row, as parts of their reach apart.
-        const STEP: f32 = 0.25;
-        /// Width of an evenly bright spot with the light of a spot, as a part of its reach.
-        const WIDTH: f32 = 0.73;
         let ends_somewhere = light.end.is_none_or(Vec3::is_finite);
         if light.radius > 0.0
             && light.origin.is_finite()
@@ -420,15 +413,6 @@ impl Scene {
             && light.color.is_finite()
         {
             self.lights.push(light);
-            let places = light.places(STEP);
-            // Where spots overlap, they add up to the light's colour.
-            let overlap = places.len() as f32 * (WIDTH * light.radius / light.length()).min(1.0);
-            self.spots.extend(places.map(|origin| DynamicLight {
-                origin,
-                color: light.color / overlap.max(1.0),
-                end: None,
-                ..light
-            }));
         }
     }
 

@@ -12,7 +12,7 @@ use shaders::types::Instance;
 use support::{Aabb, slice};
 
 use super::lights::{
-    ChangingLight, MapLights, count, number, sphere, sphere_bounds, triangle_bounds,
+    ChangingLight, MapLights, count, half_line, number, sphere, sphere_bounds, triangle_bounds,
 };
 use crate::api::DynamicLight;
 use crate::gpu::{Error, Recorder};
@@ -61,7 +61,9 @@ impl FrameLights {
 
     fn add_sphere(&mut self, light: t::SphereLight, sight: &Sight) {
         let margin = Vec3::splat(light.radius.max(SEARCH_MARGIN));
-        let at = sight.touching(Aabb::of([light.origin]).grown(margin));
+        let line = half_line(&light);
+        let ends = Aabb::of([light.origin - line, light.origin + line]);
+        let at = sight.touching(ends.grown(margin));
         let light_number = number(c::LIGHT_CHANGING_SPHERE, self.spheres.len());
         self.spheres.push(light);
         self.reach.push((light_number, sight.lit_from(&at)));
@@ -244,10 +246,7 @@ const DYNAMIC_LIGHT_CLEARANCE: f32 = 20.0;
 /// Radius of the glowing gas, as a part of the light's reach.
 const DYNAMIC_LIGHT_CORE: f32 = 0.35;
 
-/// Length of the parts of a light along a line, as a part of its reach.
-const DYNAMIC_LIGHT_STEP: f32 = 0.5;
-
-/// The game's dynamic lights as small spheres; a light along a line as a row of them.
+/// The game's dynamic lights as small spheres, those along a line as capsules.
 ///
 /// The engine gives a light a reach `r` and a colour; its classic look adds about the whole colour up to half the reach
 /// and fades to nothing at `r`. Here light falls off with the square of the distance, strong enough that a white
@@ -274,24 +273,28 @@ pub fn dynamic_lights(lights: &[DynamicLight], scale: f32) -> Vec<t::SphereLight
                 && light.end.is_none_or(Vec3::is_finite)
                 && light.color.is_finite()
         })
-        .flat_map(|light| {
+        .map(|light| {
             let half = light.radius * 0.5;
             let color = decode(light.color.max(Vec3::ZERO));
             let (part, min, max) = DYNAMIC_LIGHT_SIZE;
             let radius = (light.radius * part).clamp(min, max);
-            let places = light.places(DYNAMIC_LIGHT_STEP);
-            let line = (1.0 + (light.length() / light.radius).powi(2)).sqrt() / places.len() as f32;
-            let strength = (PI * half * half * scale * line).min(STRONGEST);
-            let core = light.radius * DYNAMIC_LIGHT_CORE;
-            places.map(move |place| t::SphereLight {
-                core,
-                ..sphere(
-                    place,
-                    radius,
-                    (color * strength).min(Vec3::splat(STRONGEST)),
-                    DYNAMIC_LIGHT_CLEARANCE,
-                )
-            })
+            let line = (light.end.unwrap_or(light.origin) - light.origin) * 0.5;
+            let (length, is_line) = (line.length(), line.length() > 0.5);
+            let stretch = (1.0 + (length / half).powi(2)).sqrt();
+            let strength = (PI * half * half * scale * stretch).min(STRONGEST);
+            let intensity = (color * strength).min(Vec3::splat(STRONGEST));
+            let at_middle = sphere(
+                light.origin + line,
+                radius,
+                intensity,
+                DYNAMIC_LIGHT_CLEARANCE,
+            );
+            t::SphereLight {
+                core: light.radius * DYNAMIC_LIGHT_CORE,
+                axis: if is_line { line } else { at_middle.axis },
+                cos_outer: if is_line { -3.0 } else { at_middle.cos_outer },
+                ..at_middle
+            }
         })
         .collect()
 }
@@ -373,19 +376,19 @@ mod tests {
                 end: Some(Vec3::X * length),
                 ..DynamicLight::default()
             };
-            let row = dynamic_lights(&[light], 1.0);
-            assert_eq!(row.len(), ((length / 50.0).ceil() as usize).clamp(1, 16));
+            let made = dynamic_lights(&[light], 1.0).remove(0);
             let receiver = Vec3::new(length * 0.5, 50.0, 0.0);
-            let irradiance: f32 = row
-                .iter()
-                .map(|part| {
-                    let to = part.origin - receiver;
-                    let area = PI * part.radius * part.radius;
-                    part.radiance.x * area * 50.0 / to.length().powi(3)
-                })
-                .sum();
+            assert_eq!(made.origin, receiver.with_y(0.0));
+            let line = half_line(&made);
+            let intensity = made.radiance.x * PI * made.radius * made.radius;
+            let parts = (0..1000).map(|i| (i as f32 + 0.5) / 500.0 - 1.0);
+            let falloff = parts.map(|part| {
+                let to = made.origin + line * part - receiver;
+                50.0 / to.length().powi(3)
+            });
+            let irradiance = intensity * falloff.sum::<f32>() / 1000.0;
             assert!(
-                (irradiance / PI - 1.0).abs() < 0.05,
+                (irradiance / PI - 1.0).abs() < 0.001,
                 "{length}: {irradiance}"
             );
         }

@@ -140,11 +140,20 @@ pub(super) fn sphere(origin: Vec3, radius: f32, intensity: Vec3, clearance: f32)
     }
 }
 
+/// From the middle of a sphere light to its end, if it is along a line.
+pub(super) fn half_line(light: &t::SphereLight) -> Vec3 {
+    if light.cos_outer <= -3.0 {
+        light.axis
+    } else {
+        Vec3::ZERO
+    }
+}
+
 /// Bounds of a sphere light.
 pub(super) fn sphere_bounds(light: &t::SphereLight) -> t::LightBounds {
     t::LightBounds {
         centre: light.origin,
-        radius: light.radius,
+        radius: light.radius + half_line(light).length(),
         axis: if light.cos_outer > -2.0 {
             light.axis * (light.cos_outer + 2.0)
         } else {

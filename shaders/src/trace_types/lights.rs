@@ -17,7 +17,8 @@ pub struct TriangleLight {
     pub end: f32,
 }
 
-/// A small emitting sphere: a point light of the map or a dynamic light of the game.
+/// A small emitting sphere: a point light of the map or a dynamic light of the game; or a capsule, the mean of the spheres
+/// along a line.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct SphereLight {
@@ -29,11 +30,11 @@ pub struct SphereLight {
     pub radiance: Vec3,
     /// Surfaces nearer to the centre cast no shadow (the model that carries the light).
     pub clearance: f32,
-    /// Direction of a spot.
+    /// Direction of a spot; of a line, from its middle to its end, units.
     pub axis: Vec3,
     /// Cosine of the angle to `axis` up to which a spot has its full radiance; -1: no spot.
     pub cos_inner: f32,
-    /// Cosine of the angle to `axis` from which on a spot is dark; -2: no spot.
+    /// Cosine of the angle to `axis` from which on a spot is dark; -2: no spot; -3: a line.
     pub cos_outer: f32,
     /// Radius of the ball of glowing gas that the sphere represents: at smaller distances the light is as at this
     /// radius. 0: none.

@@ -270,6 +270,20 @@ fn spheres_and_suns_give_their_irradiance(gpu: &mut Gpu) {
         let colour = crate::trace::frame_lights::decode(Vec3::splat(0.5)).x;
         colour * near.z / distance * (120.0 / distance.max(84.0)).powi(2)
     });
+    // along a line: a capsule
+    let ends = [Vec3::new(-70.0, 10.0, 60.0), Vec3::new(90.0, -30.0, 100.0)];
+    let mut scene = floor();
+    scene.dlight(ends[0], 120.0, 1.0);
+    scene.dlights[0].end = Some(ends[1]);
+    let strength = 60.0 * 60.0 * (1.0 + (ends[0].distance(ends[1]) / 120.0).powi(2)).sqrt();
+    check(gpu, &scene, &|p| {
+        let parts = (0..400).map(|i| (i as f32 + 0.5) / 400.0);
+        let light = parts.map(|part| {
+            let to = ends[0].lerp(ends[1], part) - p;
+            to.z / to.length() / to.length_squared().max(42.0 * 42.0)
+        });
+        strength * light.sum::<f32>() / 400.0
+    });
     let mut scene = floor();
     let direction = Vec3::new(0.3, 0.2, 0.8).normalize();
     scene.sun(direction, 2.0, 0.005);
