@@ -11,12 +11,14 @@ use std::ffi::CString;
 #[derive(Debug)]
 pub struct EngineFiles {
     engine: Engine,
+    /// Of the window, pixels.
+    size: (u32, u32),
 }
 
 impl EngineFiles {
-    /// Files of `engine`.
-    pub fn new(engine: Engine) -> Self {
-        Self { engine }
+    /// Files of `engine`, whose window has this size, pixels.
+    pub fn new(engine: Engine, size: (u32, u32)) -> Self {
+        Self { engine, size }
     }
 
     /// `path` as a valid argument of the engine's services.
@@ -53,17 +55,28 @@ impl GameFiles for EngineFiles {
         match (dir, CString::new(suffix)) {
             (Some(dir), Ok(extension)) if session::on_main_thread() => {
                 let mut names = Vec::new();
-                if dir.as_c_str() == c"scripts" && extension.as_c_str() == c".shader" {
-                    let front = self.engine.front_end();
-                    for more in front.map_or(&[][..], |front| front.scripts) {
-                        names.extend(self.engine.list_files(&dir, more));
-                    }
+                let is_scripts = dir.as_c_str() == c"scripts" && extension.as_c_str() == c".shader";
+                let front = self.engine.front_end().filter(|_| is_scripts);
+                for more in front.map_or(&[][..], |front| front.scripts) {
+                    names.extend(self.engine.list_files(&dir, more));
                 }
-                // definitions in later files replace those in earlier ones
                 names.extend(self.engine.list_files(&dir, &extension));
+                // definitions in later files replace those in earlier ones
+                if front.is_some_and(|front| front.last_script_counts) {
+                    names.reverse();
+                }
                 names
             }
             _ => Vec::new(),
+        }
+    }
+
+    fn variable(&self, name: &str) -> String {
+        match name.to_ascii_lowercase().as_str() {
+            "vid_width" => self.size.0.to_string(),
+            "vid_height" => self.size.1.to_string(),
+            _ if session::on_main_thread() => self.engine.cvar_text_if_any(name),
+            _ => String::new(),
         }
     }
 

@@ -89,7 +89,7 @@ pub unsafe extern "C" fn begin_registration(out: *mut glconfig_t) {
             cvars::apply_at_registration(&cvars, &mut front.settings);
             front.cvars = Some(cvars);
             front.registered = true;
-            let files = Arc::new(EngineFiles::new(engine));
+            let files = Arc::new(EngineFiles::new(engine, front.size));
             renderer.keep_calibrations(cache_folder);
             renderer
                 .begin_registration(files, &front.settings)

@@ -67,7 +67,9 @@ impl Materials {
                 }),
             }
         }
-        let mut materials = Materials::from_library(Library::new(scripts));
+        let mut materials = Materials::from_library(Library::with_variables(scripts, &|name| {
+            files.variable(name)
+        }));
         materials.unusable.extend_from_slice(&unreadable);
         unreadable.extend_from_slice(materials.library.diagnostics());
         (materials, unreadable)

@@ -2,7 +2,7 @@
 
 use crate::{
     diagnostic::{Diagnostic, Severity},
-    parse::parse_script,
+    parse::{Variables, parse_with},
     shader::Shader,
 };
 use std::collections::HashMap;
@@ -27,9 +27,17 @@ impl Library {
     pub fn new<N: AsRef<str>, T: AsRef<[u8]>>(
         files: impl IntoIterator<Item = (N, T), IntoIter: DoubleEndedIterator>,
     ) -> Library {
+        Self::with_variables(files, &|_| String::new())
+    }
+
+    /// [`Library::new`] with console variables, which conditions in `.shaderx` files compare.
+    pub fn with_variables<N: AsRef<str>, T: AsRef<[u8]>>(
+        files: impl IntoIterator<Item = (N, T), IntoIter: DoubleEndedIterator>,
+        variables: Variables<'_>,
+    ) -> Library {
         let mut library = Library::default();
         for (file, text) in files.into_iter().rev() {
-            let script = parse_script(file.as_ref(), text.as_ref());
+            let script = parse_with(file.as_ref(), text.as_ref(), variables);
             if script.dropped.is_some() {
                 // what the file is dropped for is found before anything else
                 library.dropped.extend(script.diagnostics.first().cloned());

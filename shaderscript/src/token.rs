@@ -269,6 +269,24 @@ impl<'a> Lexer<'a> {
         self.bytes.unclosed
     }
 
+    /// Reads a text in parentheses, which the next byte of this line but blanks must open; `None` without them.
+    pub(crate) fn parenthesis(&mut self) -> Option<String> {
+        let mut text = Vec::new();
+        let mut open = false;
+        loop {
+            let (byte, _) = self.bytes.next()?;
+            match byte {
+                b'(' if !open => open = true,
+                b' ' | b'\t' if !open => {}
+                _ if !open => return None,
+                b')' if !self.bytes.quoted => {
+                    return Some(String::from_utf8_lossy(&text).into_owned());
+                }
+                _ => text.push(byte),
+            }
+        }
+    }
+
     /// Reads the rest of the line, to be split by [`words`]; the line end is consumed.
     pub fn rest_of_line(&mut self) -> String {
         let mut text = Vec::new();

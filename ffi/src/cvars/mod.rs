@@ -91,7 +91,6 @@ fn register(engine: Engine, spec: &Spec) -> Option<Variable> {
     if is_owned(engine, spec) {
         return Some(variable);
     }
-    engine.cvar_set_group(variable);
     if let Some(range) = spec.range.filter(|range| range.by_engine) {
         engine.cvar_check_range(variable, range.min, range.max, spec.kind == Kind::Whole);
     }

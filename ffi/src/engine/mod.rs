@@ -128,6 +128,8 @@ pub struct FrontEnd {
     pub owned: &'static [&'static str],
     /// Endings of further files with materials, beside `.shader`.
     pub scripts: &'static [&'static CStr],
+    /// Of definitions with one name the engine takes the last that it reads, not the first.
+    pub last_script_counts: bool,
 }
 
 /// Functions of an engine that makes the window itself.
@@ -181,9 +183,9 @@ table! {
     cvar_set: f::Cvar_Set;
     cvar_check_range: f::Cvar_CheckRange;
     cvar_set_description: f::Cvar_SetDescription;
-    /// Marks a variable as the renderer's.
-    cvar_set_group: unsafe extern "C" fn(*mut c_void);
     cvar_variable_integer_value: f::Cvar_VariableIntegerValue;
+    /// Text of a variable, which is not made if there is none.
+    cvar_variable_string: unsafe extern "C" fn(*const c_char) -> *const c_char;
     cmd_add_command: f::Cmd_AddCommand;
     cmd_remove_command: f::Cmd_RemoveCommand;
     cmd_argc: f::Cmd_Argc;

@@ -94,6 +94,17 @@ impl Engine {
             .map_or_else(String::new, |cvar| self.cvar_string(cvar))
     }
 
+    /// Text of a variable that the engine may not have; empty if there is none, or the engine has no service that finds
+    /// one without making it.
+    pub fn cvar_text_if_any(self, name: &str) -> String {
+        let Ok(name) = CString::new(name) else {
+            return String::new();
+        };
+        self.get(|t| t.cvar_variable_string)
+            // SAFETY: the name is valid during the call; the result is null or NUL-terminated, and is copied at once.
+            .map_or_else(String::new, |f| unsafe { string_from(f(name.as_ptr())) })
+    }
+
     /// Sets a variable, regardless of its flags.
     pub fn cvar_set(self, name: &CStr, value: &str) {
         let Ok(value) = CString::new(value) else {
@@ -383,14 +394,6 @@ impl Engine {
         }) {
             // SAFETY: no arguments.
             unsafe { f() }
-        }
-    }
-
-    /// Marks a variable as the renderer's, for engines that know groups of variables.
-    pub fn cvar_set_group(self, cvar: Variable) {
-        if let Some(f) = self.get(|t| t.cvar_set_group) {
-            // SAFETY: `cvar` is one of the engine's own.
-            unsafe { f(cvar.as_ptr()) }
         }
     }
 

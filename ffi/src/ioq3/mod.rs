@@ -32,6 +32,7 @@ pub(crate) static FRONT_END: FrontEnd = FrontEnd {
     defaults: &[],
     owned: &[],
     scripts: &[],
+    last_script_counts: false,
 };
 
 unsafe fn install(imports: *const c_void) -> Engine {

@@ -34,6 +34,7 @@ pub(crate) static FRONT_END: FrontEnd = FrontEnd {
     ],
     owned: &[],
     scripts: &[],
+    last_script_counts: false,
 };
 
 /// Result of every `GetRefAPI`; the engine copies it.

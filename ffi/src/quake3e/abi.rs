@@ -60,8 +60,6 @@ pub type SyncRender = unsafe extern "C" fn();
 pub const CV_FLOAT: c_int = 1;
 /// `cvarValidator_t` of whole numbers.
 pub const CV_INTEGER: c_int = 2;
-/// `cvarGroup_t` of the renderer's variables.
-pub const CVG_RENDERER: c_int = 1;
 
 abi_struct! {
     const STRUCTURES;

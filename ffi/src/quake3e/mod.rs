@@ -1,7 +1,8 @@
 //! The front end for Quake3e and its forks with the same tables.
 //!
 //! The engine makes the window and its Vulkan surface, keeps the window or the device over a `Shutdown` by its code,
-//! and limits variables by texts.
+//! and limits variables by texts. Its groups of variables have no other use than to ask whether any of a group has
+//! changed; all variables are read in every frame anyway.
 
 pub mod abi;
 mod exports;
@@ -10,7 +11,7 @@ use crate::abi::{QBool, glconfig_t};
 use crate::engine::{
     self, Engine, FrontEnd, MainThread, Table, WindowServices, common_services, variable_layout,
 };
-use abi::{CV_FLOAT, CV_INTEGER, CVG_RENDERER, cvar_t, refexport_t, refimport_t};
+use abi::{CV_FLOAT, CV_INTEGER, cvar_t, refexport_t, refimport_t};
 use exports::EXPORTS;
 use std::cell::UnsafeCell;
 use std::ffi::{c_char, c_float, c_long, c_void};
@@ -60,6 +61,7 @@ pub(crate) static FRONT_END: FrontEnd = FrontEnd {
         "r_swapInterval",
     ],
     scripts: &[c".shaderx"],
+    last_script_counts: true,
 };
 
 /// The engine's table, for the services with other types than ioquake3's.
@@ -103,7 +105,7 @@ unsafe fn install(imports: *const c_void) -> Engine {
         variable: variable_layout!(cvar_t),
         cvar_check_range: from.Cvar_CheckRange.map(|_| check_range as _),
         cvar_set_description: from.Cvar_SetDescription,
-        cvar_set_group: from.Cvar_SetGroup.map(|_| set_group as _),
+        cvar_variable_string: from.Cvar_VariableString,
         fs_read_file: from.FS_ReadFile.map(|_| read_file as _),
         free_all: from.FreeAll,
         window,
@@ -129,17 +131,6 @@ unsafe extern "C" fn check_range(cvar: *mut c_void, min: c_float, max: c_float, 
     if let Some(f) = service(|t| t.Cvar_CheckRange) {
         // SAFETY: the engine's own variable; both texts are NUL-terminated, and the engine copies them.
         unsafe { f(cvar, low.as_ptr().cast(), high.as_ptr().cast(), kind) }
-    }
-}
-
-/// `Cvar_SetGroup` with the renderer's group.
-///
-/// # Safety
-/// `cvar` must be a variable of the engine.
-unsafe extern "C" fn set_group(cvar: *mut c_void) {
-    if let Some(f) = service(|t| t.Cvar_SetGroup) {
-        // SAFETY: the engine's own variable.
-        unsafe { f(cvar, CVG_RENDERER) }
     }
 }
 

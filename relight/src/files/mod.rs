@@ -92,6 +92,11 @@ pub trait GameFiles {
     /// folder below `dir`, as the engine does.
     fn list(&self, dir: &str, extension: &str) -> Vec<String>;
 
+    /// Value of a console variable of the engine that these files are of; empty if there is none.
+    fn variable(&self, _name: &str) -> String {
+        String::new()
+    }
+
     /// Whether [`read`](Self::read) would find the file.
     fn exists(&self, path: &str) -> bool {
         matches!(self.read(path), Ok(Some(_)))
@@ -105,6 +110,10 @@ impl<T: GameFiles + ?Sized> GameFiles for &T {
 
     fn list(&self, dir: &str, extension: &str) -> Vec<String> {
         (**self).list(dir, extension)
+    }
+
+    fn variable(&self, name: &str) -> String {
+        (**self).variable(name)
     }
 
     fn exists(&self, path: &str) -> bool {

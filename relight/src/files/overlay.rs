@@ -29,6 +29,10 @@ impl<B: GameFiles> GameFiles for Overlay<B> {
         names
     }
 
+    fn variable(&self, name: &str) -> String {
+        self.back.variable(name)
+    }
+
     fn exists(&self, path: &str) -> bool {
         self.front.exists(path) || self.back.exists(path)
     }

@@ -1,7 +1,8 @@
 //! One definition: keywords outside its stages.
 
 use super::{
-    Reporter,
+    Reporter, Variables,
+    condition::Chain,
     values::{lookup, number_at},
 };
 use crate::{
@@ -38,6 +39,10 @@ pub(super) struct DefinitionParser<'text, 'reporter, 'file> {
     pub(super) depth: u32,
     /// Faults reported so far.
     reports: usize,
+    /// The file is a `.shaderx`, whose further keywords only Quake3e knows.
+    pub(super) extended: bool,
+    pub(super) variables: Variables<'text>,
+    pub(super) chain: Chain,
 }
 
 /// Keywords that may stand alone on a line before a stage, and all others; `q3map` and `qer` are prefixes.
@@ -70,18 +75,26 @@ fn has_prefix(word: &str, prefix: &str) -> bool {
         .is_some_and(|start| start.eq_ignore_ascii_case(prefix))
 }
 
+fn has_ending(name: &str, ending: &str) -> bool {
+    let start = name.len().saturating_sub(ending.len());
+    name.get(start..)
+        .is_some_and(|end| end.eq_ignore_ascii_case(ending))
+}
+
 impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
     /// Prepares to read the text that follows a name.
     pub(super) fn new(
         lexer: Lexer<'text>,
         name: &Token,
         reporter: &'reporter mut Reporter<'file>,
+        variables: Variables<'text>,
     ) -> Self {
         let mut shader = Shader::new(name.text.clone());
         shader.location = Location {
             file: reporter.file.to_owned(),
             line: name.position.line,
         };
+        let extended = has_ending(reporter.file, ".shaderx");
         DefinitionParser {
             lexer,
             shader,
@@ -89,6 +102,9 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
             at: name.position,
             depth: 0,
             reports: 0,
+            extended,
+            variables,
+            chain: None,
         }
     }
 
@@ -218,6 +234,9 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
             }
             "cull" => self.cull(),
             "sort" => self.sort(),
+            // nothing is merged that it would keep apart
+            "novlcollapse" if self.extended => {}
+            word @ ("if" | "elif" | "else") if self.extended => self.branch(word)?,
             _ => {
                 self.shader.unknown.push(UnknownDirective {
                     keyword: token.text.clone(),

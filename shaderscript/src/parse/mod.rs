@@ -11,6 +11,7 @@
 //!
 //! Every byte is looked at a fixed number of times, whatever the input.
 
+mod condition;
 mod definition;
 mod stage;
 mod values;
@@ -20,6 +21,7 @@ use crate::{
     shader::Shader,
     token::{Lexer, Position, Reading, Token},
 };
+pub use condition::Variables;
 use definition::DefinitionParser;
 
 /// What one file defines.
@@ -64,6 +66,11 @@ impl Reporter<'_> {
 /// `file` is the name that diagnostics and [`Location`](crate::Location)s carry. Never fails as a whole: faults are
 /// in the result.
 pub fn parse_script(file: &str, text: &[u8]) -> Script {
+    parse_with(file, text, &|_| String::new())
+}
+
+/// [`parse_script`] with console variables, which conditions in `.shaderx` files compare.
+pub(crate) fn parse_with(file: &str, text: &[u8], variables: Variables<'_>) -> Script {
     let mut reporter = Reporter {
         file,
         diagnostics: Vec::new(),
@@ -140,7 +147,8 @@ pub fn parse_script(file: &str, text: &[u8]) -> Script {
             }
         }
         definition.cut_before(lexer.remaining());
-        shaders.push(DefinitionParser::new(definition, &name, &mut reporter).parse(closed));
+        shaders
+            .push(DefinitionParser::new(definition, &name, &mut reporter, variables).parse(closed));
     }
     if let (Some(start), None) = (lexer.unclosed_comment(), &dropped) {
         let lost = "this comment is never closed, so nothing after it is read, and the engine loses the scripts \

@@ -90,6 +90,10 @@ impl DefinitionParser<'_, '_, '_> {
                 draft.set_image(image);
             }
             "clampmap" => draft.set_image(StageImage::ClampMap(self.required("clampMap")?)),
+            // the engine's picture of the screen needs its r_fbo; without it, it takes the image
+            "screenmap" if self.extended => {
+                draft.set_image(StageImage::Map(self.required("screenMap")?));
+            }
             "animmap" => self.animation(draft)?,
             "videomap" => draft.set_image(StageImage::Video(self.required("videoMap")?)),
             "alphafunc" => {
@@ -124,6 +128,8 @@ impl DefinitionParser<'_, '_, '_> {
                 draft.depth_write = true;
                 draft.depth_write_forced = true;
             }
+            // of fragments that the engine's own dynamic lights and depth passes draw
+            "depthfragment" | "dlight" if self.extended => {}
             _ => return Err(Rejection(format!("unknown stage keyword '{}'", token.text))),
         }
         Ok(())
@@ -277,7 +283,15 @@ impl DefinitionParser<'_, '_, '_> {
             return;
         };
         draft.tc_gen = match kind.text.to_ascii_lowercase().as_str() {
-            "environment" => Some(TcGen::Environment),
+            "environment" => {
+                let before = self.lexer;
+                let word = self.lexer.token_on_line();
+                // the same to this renderer: the engine tilts it on the player's own weapon
+                if !(self.extended && word.is_some_and(|word| word.is("firstPerson"))) {
+                    self.lexer = before;
+                }
+                Some(TcGen::Environment)
+            }
             "lightmap" => Some(TcGen::Lightmap),
             "texture" | "base" => Some(TcGen::Base),
             "vector" => {

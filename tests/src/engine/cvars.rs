@@ -2,7 +2,7 @@
 //! ranges.
 
 use std::collections::HashMap;
-use std::ffi::{CString, c_int};
+use std::ffi::{CString, c_char, c_int};
 use std::ptr;
 
 use super::abi::{CVAR_CHEAT, CVAR_INIT, CVAR_LATCH, CVAR_ROM, CVAR_USER_CREATED, cvar_t};
@@ -212,9 +212,11 @@ impl Cvars {
         self.variables.values_mut().find(|v| ptr::eq(v.live, live))
     }
 
-    /// Whether a pointer is to one of the variables.
-    pub fn has(&mut self, live: *mut cvar_t) -> bool {
-        self.by_pointer(live).is_some()
+    /// Where the text of a variable is, until it changes; null if there is none.
+    pub fn place_of_text(&self, name: &str) -> *const c_char {
+        self.variables
+            .get(&name.to_ascii_lowercase())
+            .map_or(ptr::null(), |v| v.string.as_ptr())
     }
 
     /// `Cvar_CheckRange`. False for a pointer that is none of ours.

@@ -84,12 +84,7 @@ pub(super) extern "C" fn cvar_check_range(
     imports::cvar_check_range(cvar, min, max, (kind == 2).into());
 }
 
-pub(super) extern "C" fn cvar_set_group(cvar: *mut c_void, group: c_int) {
-    let known = with(|s| s.cvars.has(cvar.cast::<cvar_t>())) == Some(true);
-    if !known || group != 1 {
-        violation(format!("Cvar_SetGroup({cvar:?}, {group})"));
-    }
-}
+pub(super) extern "C" fn cvar_set_group(_cvar: *mut c_void, _group: c_int) {}
 
 pub(super) extern "C" fn cvar_check_group(_group: c_int) -> c_int {
     1
@@ -101,9 +96,9 @@ pub(super) extern "C" fn cvar_variable_string_buffer(_: *const c_char, _: *mut c
     violation("Cvar_VariableStringBuffer is not needed".into());
 }
 
-pub(super) extern "C" fn cvar_variable_string(_name: *const c_char) -> *const c_char {
-    violation("Cvar_VariableString is not needed".into());
-    c"".as_ptr()
+pub(super) extern "C" fn cvar_variable_string(name: *const c_char) -> *const c_char {
+    let name = imports::text(name);
+    with(|s| s.cvars.place_of_text(&name)).unwrap_or(ptr::null())
 }
 
 pub(super) extern "C" fn fs_read_file(name: *const c_char, buffer: *mut *mut c_void) -> c_int {

@@ -112,8 +112,28 @@ fn extended_scripts_are_read() {
     options
         .files
         .push(("scripts/more.shaderx".to_owned(), script("$whiteimage")));
+    let condition =
+        "test/size\n{\nif ( $vid_width == 320 && $r_testValue >= 2 )\n{\nmap $whiteimage\n}\n}\n";
+    for (name, text) in [
+        ("scripts/size.shaderx", condition.as_bytes()),
+        // the extended definition counts, and of ordinary ones that of the file with the highest priority
+        (
+            "scripts/more.shader",
+            b"test/extended\n{\n{\nmap none\n}\n}\n",
+        ),
+    ] {
+        options.files.push((name.to_owned(), text.to_vec()));
+    }
+    options
+        .cvars
+        .push(("r_testValue".to_owned(), "2".to_owned()));
     let mut engine = Engine::start(options).expect("the library starts");
-    assert!(engine.register_shader("test/extended").unwrap() > 0);
+    for name in ["test/extended", "test/size"] {
+        assert!(engine.register_shader(name).unwrap() > 0, "{name}");
+    }
+    engine.set("r_testValue", "1");
+    engine.start_map(ROOMS).unwrap();
+    assert_eq!(engine.register_shader("test/size").unwrap(), 0);
     engine.assert_clean();
 }
 
