@@ -6,8 +6,28 @@ use crate::abi::{
 };
 use glam::{Vec2, Vec3};
 use renderer_vk::LoadedFont;
-use renderer_vk::api::{EntityKind, MarkFragment, Orientation, PolyVert, RefDef, RefEntity};
+use renderer_vk::api::{
+    EntityKind, MarkFragment, Orientation, PolyVert, RefDef, RefEntity, StretchedPicture,
+};
 use std::ffi::c_char;
+
+/// The part of a picture within a region (left, top, right, bottom), if there is any. An empty region does not clip.
+pub fn clipped(whole: StretchedPicture, region: [f32; 4]) -> Option<StretchedPicture> {
+    let [left, top, right, bottom] = region;
+    if !(right > left && bottom > top) {
+        return Some(whole);
+    }
+    let (start, end) = (whole.position, whole.position + whole.size);
+    let position = start.max(Vec2::new(left, top));
+    let size = end.min(Vec2::new(right, bottom)) - position;
+    let texel = |place: Vec2| whole.st1 + (whole.st2 - whole.st1) * ((place - start) / whole.size);
+    size.cmpgt(Vec2::ZERO).all().then(|| StretchedPicture {
+        position,
+        size,
+        st1: texel(position),
+        st2: texel(position + size),
+    })
+}
 
 /// The kind of an entity; `None` for an invalid number.
 fn entity_kind(number: i32) -> Option<EntityKind> {
@@ -192,6 +212,31 @@ pub unsafe fn write_vector(to: *mut Vec3C, vector: Vec3) {
 mod tests {
     use super::*;
     use crate::abi::RT_MAX_REF_ENTITY_TYPE;
+
+    #[test]
+    fn pictures_are_clipped_with_their_coordinates() {
+        let picture = |[x, y, w, h]: [f32; 4], [s1, t1, s2, t2]: [f32; 4]| StretchedPicture {
+            position: Vec2::new(x, y),
+            size: Vec2::new(w, h),
+            st1: Vec2::new(s1, t1),
+            st2: Vec2::new(s2, t2),
+        };
+        let whole = picture([10.0, 20.0, 40.0, 80.0], [0.0, 1.0, 1.0, 0.0]);
+        for (region, expected) in [
+            ([0.0; 4], Some(whole)),
+            ([30.0, 0.0, 20.0, 100.0], Some(whole)),
+            ([f32::NAN; 4], Some(whole)),
+            ([0.0, 0.0, 640.0, 480.0], Some(whole)),
+            (
+                [20.0, 40.0, 30.0, 80.0],
+                Some(picture([20.0, 40.0, 10.0, 40.0], [0.25, 0.75, 0.5, 0.25])),
+            ),
+            ([50.0, 0.0, 640.0, 480.0], None),
+            ([0.0, 0.0, 640.0, 20.0], None),
+        ] {
+            assert_eq!(clipped(whole, region), expected, "{region:?}");
+        }
+    }
 
     #[test]
     fn every_entity_type_of_the_engine_is_known_and_no_other() {

@@ -2,11 +2,15 @@
 //! engines.
 
 use crate::engine::FrontEnd;
-use crate::{ioq3, openarena, quake3e};
+use crate::{ioq3, openarena, quake3e, tremulous};
 
 /// The supported engines, in the order of recognition.
-pub static FRONT_ENDS: &[&FrontEnd] =
-    &[&ioq3::FRONT_END, &openarena::FRONT_END, &quake3e::FRONT_END];
+pub static FRONT_ENDS: &[&FrontEnd] = &[
+    &ioq3::FRONT_END,
+    &openarena::FRONT_END,
+    &quake3e::FRONT_END,
+    &tremulous::FRONT_END,
+];
 
 /// An engine with a supported engine's version number and other tables.
 #[derive(Debug)]

@@ -22,7 +22,7 @@
 //!
 //! # Modules
 //! [`abi`] holds the structures that all engines share, `engine` the services of any engine as methods over one internal
-//! table. A front end ([`ioq3`], [`openarena`], [`quake3e`]) is one folder: the engine's tables, a function that fills the
+//! table. A front end ([`ioq3`], [`openarena`], [`quake3e`], [`tremulous`]) is one folder: the engine's tables, a function that fills the
 //! internal table, the table of exports, and a row of what is particular to the engine. The other modules name no engine;
 //! `front_ends` lists the front ends. `docs/port-to-your-engine.md` explains how to add one.
 
@@ -59,6 +59,7 @@ mod scene;
 mod session;
 mod speeds;
 mod system;
+pub mod tremulous;
 mod window;
 
 use std::ffi::{c_int, c_void};

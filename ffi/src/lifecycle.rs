@@ -1,6 +1,6 @@
 //! Registration, frames and shutdown: lifetime of the window, the device and the assets.
 
-use crate::abi::{QBool, STEREO_LEFT, STEREO_RIGHT, glconfig_t};
+use crate::abi::{QBool, STEREO_LEFT, STEREO_RIGHT, glconfig_t, is_true};
 use crate::boundary::entry;
 use crate::capture::{self, VideoFrame};
 use crate::commands;
@@ -218,10 +218,10 @@ pub enum Ending {
 /// which is notified first, must not use it afterwards. Buffers of [`take_video_frame`] are forgotten.
 pub unsafe extern "C" fn shutdown(destroy_window: QBool) {
     entry(|| {
-        end(if destroy_window == 0 {
-            Ending::KeepAll
-        } else {
+        end(if is_true(destroy_window) {
             Ending::Close
+        } else {
+            Ending::KeepAll
         });
         Ok(())
     });
@@ -247,6 +247,7 @@ pub fn end(ending: Ending) {
     commands::remove(engine);
     let destroyed = session::with(|session| {
         session.front.registered = false;
+        session.front.clip_region = None;
         session.front.captures.clear();
         session.front.cinematics.clear();
         if let Some(renderer) = &mut session.renderer {
@@ -489,7 +490,7 @@ pub unsafe extern "C" fn take_video_frame(
                     width,
                     height,
                     encode_buffer,
-                    motion_jpeg: motion_jpeg != 0,
+                    motion_jpeg: is_true(motion_jpeg),
                 });
             }
             Ok(())

@@ -1,6 +1,6 @@
 //! Registration of assets, the scene and 2D drawing.
 
-use crate::abi::{QBool, Vec3C, fontInfo_t, polyVert_t, refEntity_t, refdef_t};
+use crate::abi::{QBool, Vec3C, fontInfo_t, is_true, polyVert_t, refEntity_t, refdef_t};
 use crate::boundary::entry;
 use crate::convert;
 pub use crate::convert::ShaderTime;
@@ -398,10 +398,13 @@ pub unsafe extern "C" fn set_color(rgba: *const [c_float; 4]) {
 #[allow(clippy::too_many_arguments)] // the engine's signature
 pub unsafe extern "C" fn stretch_pic(x: c_float, y: c_float, w: c_float, h: c_float, s1: c_float, t1: c_float, s2: c_float, t2: c_float, shader: c_int) {
     entry(|| {
-        draw(|renderer, _| {
+        draw(|renderer, front| {
             let (position, size) = (Vec2::new(x, y), Vec2::new(w, h));
             let (st1, st2) = (Vec2::new(s1, t1), Vec2::new(s2, t2));
-            renderer.stretch_pic(&StretchedPicture { position, size, st1, st2 }, shader);
+            let whole = StretchedPicture { position, size, st1, st2 };
+            if let Some(picture) = convert::clipped(whole, front.clip_region.unwrap_or_default()) {
+                renderer.stretch_pic(&picture, shader);
+            }
             Ok(())
         })
     });
@@ -443,7 +446,7 @@ pub unsafe extern "C" fn stretch_raw(x: c_int, y: c_int, w: c_int, h: c_int, col
         let pixels = unsafe { raw_pixels(cols, rows, data) };
         draw(|renderer, _| match (pixels, usize::try_from(client)) {
             (Some((cols, rows, rgba)), Ok(client)) => {
-                let frame = CinematicFrame { cols, rows, rgba, client, dirty: dirty != 0 };
+                let frame = CinematicFrame { cols, rows, rgba, client, dirty: is_true(dirty) };
                 renderer.stretch_raw(IVec2::new(x, y), IVec2::new(w, h), &frame).map_err(Failure::from)
             }
             _ => Ok(()),
@@ -476,7 +479,7 @@ pub unsafe extern "C" fn upload_cinematic(
                         rows,
                         rgba,
                         client,
-                        dirty: dirty != 0,
+                        dirty: is_true(dirty),
                     };
                     renderer.upload_cinematic(&frame).map_err(Failure::from)
                 }

@@ -50,6 +50,8 @@ pub struct Front {
     pub frame_start: Option<Instant>,
     /// The renderer has finished a frame.
     pub has_picture: bool,
+    /// Region of 2D pictures: left, top, right, bottom, window pixels.
+    pub clip_region: Option<[f32; 4]>,
     /// The engine does not want to see the next frame.
     pub skip_present: bool,
     /// The last shutdown kept the window or the device, for a `GetRefAPI` that may come before the next registration.

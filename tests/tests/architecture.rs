@@ -208,7 +208,7 @@ fn no_modules_of_a_crate_use_each_other_in_a_circle() {
 
 #[test]
 fn front_ends_alone_name_engines() {
-    const NAMES: [&str; 4] = ["ioq3", "ioquake", "quake3e", "openarena"];
+    const NAMES: [&str; 5] = ["ioq3", "ioquake", "quake3e", "openarena", "tremulous"];
     let root = tests::data::repository().join("ffi/src");
     let mut files = Vec::new();
     sources(&root, &mut files);

@@ -10,6 +10,13 @@ use std::ffi::{c_char, c_float, c_int, c_uchar};
 
 /// `qboolean`: a C enum, 0 or 1. Not a Rust enum, because the engine may pass any int.
 pub type QBool = c_int;
+
+/// Value of a `qboolean`, or of the one-byte `bool` of engines in C++, which leaves the upper bytes of its register
+/// undefined.
+pub fn is_true(value: QBool) -> bool {
+    value.to_le_bytes()[0] != 0
+}
+
 /// `vec3_t` inside a structure.
 pub type Vec3C = [c_float; 3];
 

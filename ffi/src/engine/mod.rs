@@ -66,7 +66,7 @@ impl Variable {
 pub struct VariableLayout {
     /// `char *string`.
     pub string: usize,
-    /// `qboolean modified`.
+    /// `qboolean modified`, or a `bool`: 0 or 1, of which only the first byte is used.
     pub modified: usize,
     /// `float value`.
     pub value: usize,

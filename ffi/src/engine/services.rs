@@ -7,7 +7,7 @@ use super::{
     Engine, FrontEnd, TABLE, Table, Variable, VariableLayout, WindowServices, print, string_from,
     valid_path_to_write,
 };
-use crate::abi::{CIN_MATERIAL, EXEC_APPEND, QBool};
+use crate::abi::{CIN_MATERIAL, EXEC_APPEND, is_true};
 use crate::system;
 use std::ffi::{CStr, CString, c_char, c_float, c_int, c_uchar, c_void};
 use std::path::PathBuf;
@@ -150,15 +150,14 @@ impl Engine {
     /// Whether the value has changed since [`Engine::cvar_seen`].
     pub fn cvar_modified(self, cvar: Variable) -> bool {
         // SAFETY: a member of a variable of the engine, which only this thread changes: there are no concurrent writes.
-        unsafe { *self.member::<QBool>(cvar, |layout| layout.modified) != 0 }
+        unsafe { *self.member::<u8>(cvar, |layout| layout.modified) != 0 }
     }
 
     /// Marks a change as processed, which is the duty of a variable's owner.
     pub fn cvar_seen(self, cvar: Variable) {
-        const NO: QBool = 0;
         // SAFETY: a member of a variable of the engine, which only this thread changes. The engine expects a variable's
         // owner to clear it.
-        unsafe { *self.member(cvar, |layout| layout.modified) = NO }
+        unsafe { *self.member::<u8>(cvar, |layout| layout.modified) = 0 }
     }
 
     /// Limits a variable to a range from now on.
@@ -310,7 +309,7 @@ impl Engine {
     pub fn home_file_exists(self, name: &CStr) -> bool {
         // SAFETY: the name is valid during the call.
         self.get(|t| t.fs_file_exists)
-            .is_some_and(|f| unsafe { f(name.as_ptr()) } != 0)
+            .is_some_and(|f| is_true(unsafe { f(name.as_ptr()) }))
     }
 
     /// Starts a video for a material. `None` if it cannot be played.

@@ -7,7 +7,9 @@ use std::ffi::{c_int, c_void};
 
 pub use relight_ffi::abi::*;
 pub use relight_ffi::ioq3::abi::{cvar_t, refexport_t, refimport_t};
-pub use relight_ffi::{openarena::abi as openarena, quake3e::abi as quake3e};
+pub use relight_ffi::{
+    openarena::abi as openarena, quake3e::abi as quake3e, tremulous::abi as tremulous,
+};
 
 /// The version that `GetRefAPI` is called with.
 pub const REF_API_VERSION: c_int = 8;

@@ -12,7 +12,7 @@ use std::ptr;
 use std::rc::Rc;
 use std::time::Instant;
 
-use super::abi::{ERR_FATAL, cvar_t, glconfig_t, quake3e, refexport_t};
+use super::abi::{ERR_FATAL, cvar_t, glconfig_t, quake3e, refexport_t, tremulous};
 use super::cvars::Cvars;
 use super::files::Files;
 use super::memory::Memory;
@@ -70,6 +70,7 @@ pub(super) struct State {
     pub exports: Option<refexport_t>,
     /// The functions that only this engine's renderers have.
     pub quake3e: Option<quake3e::refexport_t>,
+    pub tremulous: Option<tremulous::refexport_t>,
     /// Where `BeginRegistration` writes; the real engine keeps one such structure for good.
     pub config: Box<glconfig_t>,
     pub cvars: Cvars,

@@ -16,6 +16,7 @@ mod imports;
 mod inspection;
 pub mod memory;
 mod quake3e;
+mod tremulous;
 
 use std::ffi::{CString, c_void};
 use std::mem::MaybeUninit;
@@ -149,11 +150,14 @@ fn call<R: Copy>(f: impl FnOnce() -> R + Copy) -> Result<R, Raised> {
 
 /// The functions of a renderer for another engine as those of one for ioquake3.
 macro_rules! as_ioquake3 {
-    ($from:expr, $add_entity:expr) => {
+    ($from:expr) => {
+        as_ioquake3!($from, $from.BeginRegistration, $from.AddRefEntityToScene)
+    };
+    ($from:expr, $begin:expr, $add_entity:expr) => {
         refexport_t {
             AddRefEntityToScene: $add_entity,
             Shutdown: $from.Shutdown,
-            BeginRegistration: $from.BeginRegistration,
+            BeginRegistration: $begin,
             RegisterModel: $from.RegisterModel,
             RegisterSkin: $from.RegisterSkin,
             RegisterShader: $from.RegisterShader,
@@ -202,25 +206,31 @@ unsafe extern "C" fn add_entity_in_seconds(entity: *const refEntity_t) {
 /// # Safety
 /// The pointer must be to the table of a renderer for this engine.
 unsafe fn keep_exports(tables: Tables, exports: *const c_void) {
-    let (exports, quake3e) = match tables {
-        Tables::Ioquake3 | Tables::WorldOfPadman => {
-            // SAFETY: a table of this type, by the caller's promise.
-            (unsafe { exports.cast::<refexport_t>().read() }, None)
-        }
+    let (mut quake3e, mut tremulous) = (None, None);
+    let exports = match tables {
+        // SAFETY: a table of this type, by the caller's promise.
+        Tables::Ioquake3 | Tables::WorldOfPadman => unsafe { exports.cast::<refexport_t>().read() },
         Tables::OpenArena => {
             // SAFETY: as above.
             let re = unsafe { exports.cast::<openarena::refexport_t>().read() };
-            (as_ioquake3!(re, re.AddRefEntityToScene), None)
+            as_ioquake3!(re)
         }
         Tables::Quake3e | Tables::Quake3eCutOff => {
             // SAFETY: as above.
-            let re = unsafe { exports.cast::<abi::quake3e::refexport_t>().read() };
-            (as_ioquake3!(re, add_entity_in_seconds), Some(re))
+            let re = *quake3e.insert(unsafe { exports.cast::<abi::quake3e::refexport_t>().read() });
+            as_ioquake3!(re, re.BeginRegistration, add_entity_in_seconds)
+        }
+        Tables::Tremulous => {
+            // SAFETY: as above.
+            let re =
+                *tremulous.insert(unsafe { exports.cast::<abi::tremulous::refexport_t>().read() });
+            as_ioquake3!(re, tremulous::begin_registration, re.AddRefEntityToScene)
         }
     };
     imports::with(|s| {
         s.exports = Some(exports);
         s.quake3e = quake3e;
+        s.tremulous = tremulous;
     });
 }
 
@@ -325,6 +335,7 @@ impl Engine {
             tables: options.tables,
             exports: None,
             quake3e: None,
+            tremulous: None,
             // SAFETY: numbers and characters alone, for which zero is a value.
             config: Box::new(unsafe { std::mem::zeroed() }),
             cvars: cvars::Cvars::default(),

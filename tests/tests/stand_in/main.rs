@@ -9,4 +9,5 @@ mod pictures;
 mod quake3e;
 mod session;
 mod support;
+mod tremulous;
 mod views;

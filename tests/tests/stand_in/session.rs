@@ -118,8 +118,8 @@ fn cvars_and_commands_come_and_go() {
         (1, "0"),
         "r_rt is archived and off by default"
     );
-    // OpenArena's engine stores none
-    let kept = options().tables != Tables::OpenArena;
+    // OpenArena's engine stores none, Tremulous elsewhere
+    let kept = !matches!(options().tables, Tables::OpenArena | Tables::Tremulous);
     assert_eq!(description.is_some_and(|d| !d.is_empty()), kept);
     let commands = engine.commands();
     for name in [
@@ -246,7 +246,7 @@ fn caches_lie_in_the_first_home_that_the_engine_has() {
         let home = tempfile::tempdir().unwrap();
         let mut options = options();
         let base = match options.tables {
-            Tables::Quake3e => "fs_basegame",
+            Tables::Quake3e | Tables::Tremulous => "fs_basegame",
             _ => "com_basegame",
         };
         for (name, value) in [(name, home.path().to_str().unwrap()), (base, "base")] {

@@ -20,6 +20,7 @@ macro_rules! for_every_engine {
     ($($test:ident),* $(,)?) => {
         mod ioquake3 { $( #[test] fn $test() { crate::support::with_tables(tests::engine::Tables::Ioquake3, super::$test); } )* }
         mod openarena { $( #[test] fn $test() { crate::support::with_tables(tests::engine::Tables::OpenArena, super::$test); } )* }
+        mod tremulous { $( #[test] fn $test() { crate::support::with_tables(tests::engine::Tables::Tremulous, super::$test); } )* }
         mod quake3e { $( #[test] fn $test() { crate::support::with_tables(tests::engine::Tables::Quake3e, super::$test); } )* }
     };
 }

@@ -3,8 +3,8 @@
 use std::ffi::c_int;
 use std::ptr;
 
-use super::super::abi::{openarena, quake3e, refimport_t};
-use super::super::quake3e as own;
+use super::super::abi::{openarena, quake3e, refimport_t, tremulous};
+use super::super::{quake3e as own, tremulous as trem};
 use super::*;
 
 /// Whose services the renderer is offered, all under one version number.
@@ -21,6 +21,8 @@ pub enum Tables {
     Quake3e,
     /// The same with numbers in place of the last services.
     Quake3eCutOff,
+    /// 38: without `ftol` and `Sys_SetEnv`, in C++.
+    Tremulous,
 }
 
 impl Tables {
@@ -31,6 +33,7 @@ impl Tables {
             Tables::WorldOfPadman => "wop 1.36",
             Tables::OpenArena => "OpenArena 0.8.8 oa2020",
             Tables::Quake3e | Tables::Quake3eCutOff => "Q3 1.32e",
+            Tables::Tremulous => "tremulous",
         }
     }
 
@@ -69,6 +72,7 @@ pub(in super::super) fn words(tables: Tables) -> [usize; 64] {
         }
         Tables::OpenArena => words_of::<_, 39>(openarena_table()),
         Tables::Quake3e => words_of::<_, 56>(quake3e_table()),
+        Tables::Tremulous => words_of::<_, 38>(tremulous_table()),
         Tables::Quake3eCutOff => {
             let mut words = words_of::<_, 56>(quake3e_table());
             words[50..56].fill(1);
@@ -102,7 +106,6 @@ macro_rules! table {
             FS_ListFiles: Some(fs_list_files),
             FS_FreeFileList: Some(fs_free_file_list),
             FS_WriteFile: Some(fs_write_file),
-            FS_FileExists: Some(fs_file_exists),
             CIN_UploadCinematic: Some(cin_upload),
             CIN_PlayCinematic: Some(cin_play),
             CIN_RunCinematic: Some(cin_run),
@@ -126,8 +129,6 @@ macro_rules! renderer_made_window {
             IN_Init: input_init,
             IN_Shutdown: nothing,
             IN_Restart: nothing,
-            ftol: ftol,
-            Sys_SetEnv: set_environment,
             Sys_GLimpSafeInit: nothing,
             Sys_GLimpInit: nothing,
         })
@@ -136,18 +137,34 @@ macro_rules! renderer_made_window {
 
 fn ioquake3_table() -> refimport_t {
     renderer_made_window!(refimport_t {
-        Cvar_SetDescription: cvar_set_description
+        Cvar_SetDescription: cvar_set_description,
+        FS_FileExists: fs_file_exists,
+        ftol: ftol,
+        Sys_SetEnv: set_environment,
     })
 }
 
 fn openarena_table() -> openarena::refimport_t {
     use openarena::refimport_t;
-    renderer_made_window!(refimport_t {})
+    renderer_made_window!(refimport_t {
+        FS_FileExists: fs_file_exists,
+        ftol: ftol,
+        Sys_SetEnv: set_environment,
+    })
+}
+
+fn tremulous_table() -> tremulous::refimport_t {
+    use tremulous::refimport_t;
+    renderer_made_window!(refimport_t {
+        Cvar_SetDescription: trem::set_description,
+        FS_FileExists: trem::file_exists,
+    })
 }
 
 fn quake3e_table() -> quake3e::refimport_t {
     use quake3e::refimport_t;
     table!(refimport_t {
+        FS_FileExists: fs_file_exists,
         Microseconds: own::microseconds,
         Hunk_Alloc: own::hunk_alloc,
         Hunk_AllocateTempMemory: own::hunk_allocate_temporary,
