@@ -88,9 +88,9 @@ settings! { variables {
     round_images_down: bool = "r_roundImagesDown", "1", ARCHIVE | LATCH, None, Frame, GoesOn, "1 shrinks textures of odd sizes to a power of two, 0 enlarges them.";
     color_mip_levels: bool = "r_colorMipLevels", "0", LATCH, None, Frame, GoesOn, "1 tints smaller mip levels red, green and blue in turn.";
     simple_mip_maps: bool = "r_simpleMipMaps", "1", ARCHIVE | LATCH, None, Frame, GoesOn, "1 averages 2x2 pixels for mip levels, 0 filters wider.";
-    fade_detail: bool = "r_detailFade", "0", ARCHIVE | LATCH, None, Frame, GoesOn, "1 fades mip levels of images under textures/detail/ and gfx/fx/detail/ to grey, and halves none of these images, as OpenArena's engine.";
     own_specular: bool = "r_specMode", "0", ARCHIVE, None, Frame, GoesOn, "alphaGen lightingSpecular on models: 0 reflects a light at (-960, 1980, 96), 1 the light of the grid, as OpenArena's engine.";
     detail_textures: bool = "r_detailtextures", "1", ARCHIVE | LATCH, None, Frame, GoesOn, "0 leaves detail stages of materials out.";
+    detail_fade: bool = "r_detailFade", "0", ARCHIVE | LATCH, None, Frame, GoesOn, "1 fades mip levels of detail stages to grey, as OpenArena's engine does.";
     intensity: f32 = "r_intensity", "1", LATCH, written_back(1.0, f32::MAX), With("r_gamma"), GoesOn, "Multiplies textures; 1 or more.";
     gamma: f32 = "r_gamma", "1", ARCHIVE, written_back(0.5, 3.0), With("r_gamma"), GoesOn, "Brightness of the display, 0.5 to 3.";
     overbright_bits: u32 = "r_overBrightBits", "1", ARCHIVE | LATCH, None, With("r_gamma"), GoesOn, "Doublings of light beyond white in the classic look, in full screen.";

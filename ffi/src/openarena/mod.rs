@@ -26,10 +26,10 @@ pub(crate) static FRONT_END: FrontEnd = FrontEnd {
     folders: &[],
     base_game: c"com_basegame",
     defaults: &[
+        ("r_detailFade", "1"),
         ("r_fullscreen", "1"),
         ("r_mode", "-2"),
         ("r_textureMode", "GL_LINEAR_MIPMAP_NEAREST"),
-        ("r_detailFade", "1"),
         ("r_specMode", "1"),
     ],
     owned: &[],

@@ -22,6 +22,7 @@ pub(super) fn sky_faces(outer: &str, source: &mut dyn ImageSource) -> Option<[u3
         mipmap: true,
         picmip: true,
         clamp: true,
+        detail: false,
     };
     let faces = Sky::SIDES.map(|side| {
         source

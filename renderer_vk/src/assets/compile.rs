@@ -253,6 +253,7 @@ impl StageArrays {
                 mipmap: !stage.no_mipmaps,
                 picmip: !stage.no_picmip,
                 clamp,
+                detail: stage.detail,
             })
         };
         let sampler_of = |flags: ImageFlags| match (flags.clamp, flags.mipmap) {

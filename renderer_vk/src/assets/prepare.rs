@@ -2,8 +2,6 @@
 //!
 //! Source: engine behaviour of `renderer_opengl1`: sides become powers of two, `r_picmip` halves, then the mip chain.
 
-use std::iter::repeat;
-
 use glam::{Vec3, Vec4};
 use relight::image::Image;
 use relight::overbright;
@@ -21,6 +19,8 @@ pub struct TextureSettings {
     pub round_down: bool,
     /// Box filter for mip levels; otherwise a weighted 4 x 4 filter.
     pub simple_mip_maps: bool,
+    /// Mip levels of detail stages fade to grey.
+    pub detail_fade: bool,
     /// Factor on the colours of mipmapped images, at least 1.
     pub intensity: f32,
     /// Gamma applied to images if the display applies none: `r_gamma` with `r_ignorehwgamma`, otherwise 1.
@@ -29,8 +29,6 @@ pub struct TextureSettings {
     pub greyscale: f32,
     /// Mip levels are tinted.
     pub color_mips: bool,
-    /// Mip levels of images in [`DETAIL_FOLDERS`] fade to grey, and `picmip` does not apply to these images.
-    pub fade_detail: bool,
     /// Maximum side that the device supports.
     pub max_size: u32,
 }
@@ -42,6 +40,7 @@ impl TextureSettings {
             picmip: settings.picmip,
             round_down: settings.round_images_down,
             simple_mip_maps: settings.simple_mip_maps,
+            detail_fade: settings.detail_fade,
             intensity: if settings.intensity.is_finite() {
                 settings.intensity.max(1.0)
             } else {
@@ -54,31 +53,19 @@ impl TextureSettings {
                 0.0
             },
             color_mips: settings.color_mip_levels,
-            fade_detail: settings.fade_detail,
             max_size: max_size.max(1),
         }
     }
 }
 
-/// Beginnings of the names of images that `r_detailFade` affects, by OpenArena's engine (`tr_image.c`, `R_FindImageFile`).
-const DETAIL_FOLDERS: [&str; 2] = ["textures/detail/", "gfx/fx/detail/"];
-
-/// Fraction of grey that is mixed into each mip level below the largest; the last one applies to all smaller levels.
-const DETAIL_FADE: [f32; 4] = [0.25, 0.5, 0.75, 1.0];
-
-/// The levels of the texture with this name, largest first; at least one.
-pub fn prepare(
-    name: &str,
-    image: &Image,
-    flags: ImageFlags,
-    settings: &TextureSettings,
-) -> Vec<Image> {
-    let fades = settings.fade_detail && DETAIL_FOLDERS.iter().any(|f| name.starts_with(f));
+/// The levels of a texture, largest first; at least one.
+pub fn prepare(image: &Image, flags: ImageFlags, settings: &TextureSettings) -> Vec<Image> {
     let mut base = image.to_power_of_two(settings.round_down);
     let whole = (base.width, base.height);
     if settings.greyscale > 0.0 {
         desaturate(&mut base.rgba, settings.greyscale);
     }
+    let fades = flags.detail && settings.detail_fade;
     let halvings = if flags.picmip && !fades {
         settings.picmip
     } else {
@@ -106,27 +93,33 @@ pub fn prepare(
     }
     let mut levels = vec![base];
     let mut tints = MIP_TINTS.iter().cycle();
-    let mut fades = DETAIL_FADE
-        .into_iter()
-        .chain(repeat(1.0))
-        .take_while(|_| fades);
     while let Some(last) = levels.last()
         && (last.width > 1 || last.height > 1)
     {
+        // from a tinted or faded level
         let mut next = smaller(last, settings.simple_mip_maps);
         if settings.color_mips
             && let Some(tint) = tints.next()
         {
-            // the next level is computed from the tinted one
             blend_over(&mut next.rgba, *tint);
         }
-        if let Some(fade) = fades.next() {
-            // like the tint, the fade accumulates over the levels
-            fade_to_grey(&mut next.rgba, fade);
+        if fades {
+            fade_to_grey(&mut next.rgba, levels.len());
         }
         levels.push(next);
     }
     levels
+}
+
+/// Blends a mip level of a detail stage towards the grey that `dst_color src_color` leaves unchanged: a quarter at the
+/// first level, all from the fourth on.
+fn fade_to_grey(rgba: &mut [u8], level: usize) {
+    let grey = level.min(4) as u32;
+    for [color @ .., _] in rgba.as_chunks_mut::<4>().0 {
+        for channel in color {
+            *channel = ((u32::from(*channel) * (4 - grey) + 127 * grey) / 4) as u8;
+        }
+    }
 }
 
 /// Colours of `r_colorMipLevels` from the first mip level below the largest.
@@ -138,17 +131,6 @@ fn blend_over(rgba: &mut [u8], tint: [u8; 3]) {
         for (channel, tint) in texel.iter_mut().zip(tint) {
             let mixed = (u32::from(*channel) * 127 + u32::from(tint) * 128) >> 9;
             *channel = u8::try_from(mixed).unwrap_or(u8::MAX);
-        }
-    }
-}
-
-/// Replaces a fraction of the colour by 127, which leaves a surface as it is in a stage that blends by
-/// `GL_DST_COLOR GL_SRC_COLOR`.
-fn fade_to_grey(rgba: &mut [u8], fraction: f32) {
-    for texel in rgba.as_chunks_mut::<4>().0 {
-        for channel in texel.iter_mut().take(3) {
-            // in 0..=255
-            *channel = (f32::from(*channel) * (1.0 - fraction) + 127.0 * fraction) as u8;
         }
     }
 }
@@ -323,7 +305,7 @@ mod tests {
     #[test]
     fn sizes_follow_the_flags() {
         let sizes = |flags, settings: &TextureSettings| {
-            prepare("a.tga", &grey(100, 60, 9), flags, settings)
+            prepare(&grey(100, 60, 9), flags, settings)
                 .iter()
                 .map(|i| (i.width, i.height))
                 .collect::<Vec<_>>()
@@ -359,8 +341,7 @@ mod tests {
             max_size: 64,
             ..settings()
         };
-        let first =
-            |side, flags| prepare("a.tga", &grey(side, side, 64), flags, &brighter)[0].rgba[0];
+        let first = |side, flags| prepare(&grey(side, side, 64), flags, &brighter)[0].rgba[0];
         // 255 * (64 / 255) ^ 0.5
         assert_eq!(first(2, ImageFlags::WORLD), 128);
         assert_eq!(first(128, ImageFlags::NO_MIP), 128);
@@ -388,15 +369,15 @@ mod tests {
             ..settings()
         };
         assert_eq!(
-            prepare("a.tga", &grey(2, 2, 100), ImageFlags::WORLD, &bright)[0].rgba[0],
+            prepare(&grey(2, 2, 100), ImageFlags::WORLD, &bright)[0].rgba[0],
             200
         );
         assert_eq!(
-            prepare("a.tga", &grey(2, 2, 200), ImageFlags::WORLD, &bright)[0].rgba[0],
+            prepare(&grey(2, 2, 200), ImageFlags::WORLD, &bright)[0].rgba[0],
             255
         );
         assert_eq!(
-            prepare("a.tga", &grey(2, 2, 100), ImageFlags::NO_MIP, &bright)[0].rgba[0],
+            prepare(&grey(2, 2, 100), ImageFlags::NO_MIP, &bright)[0].rgba[0],
             100
         );
     }
@@ -407,7 +388,7 @@ mod tests {
             simple_mip_maps: false,
             ..settings()
         };
-        for level in prepare("a.tga", &grey(8, 8, 77), ImageFlags::WORLD, &weighted) {
+        for level in prepare(&grey(8, 8, 77), ImageFlags::WORLD, &weighted) {
             assert!(level.rgba.chunks(4).all(|t| t == [77, 77, 77, 255]));
         }
     }
@@ -446,7 +427,7 @@ mod tests {
             color_mips: true,
             ..settings()
         };
-        let levels = prepare("a.tga", &grey(8, 8, 200), ImageFlags::WORLD, &tinted);
+        let levels = prepare(&grey(8, 8, 200), ImageFlags::WORLD, &tinted);
         assert_eq!(levels[0].rgba[..4], [200, 200, 200, 255]);
         // (200 * 127 + 255 * 128) / 512, (200 * 127) / 512
         assert_eq!(levels[1].rgba[..4], [113, 49, 49, 255]);
@@ -454,27 +435,24 @@ mod tests {
     }
 
     #[test]
-    fn mip_levels_of_detail_images_fade_to_grey() {
-        let faded = TextureSettings {
-            fade_detail: true,
-            picmip: 1,
-            ..settings()
+    fn levels_of_detail_stages_fade_to_grey() {
+        let detail = ImageFlags {
+            detail: true,
+            ..ImageFlags::WORLD
         };
-        let image = grey(32, 32, 201);
-        let values = |name: &str| -> Vec<u8> {
-            let levels = prepare(name, &image, ImageFlags::WORLD, &faded);
-            levels.iter().map(|level| level.rgba[0]).collect()
+        let values = |detail_fade, flags| {
+            let settings = TextureSettings {
+                detail_fade,
+                picmip: 1,
+                ..settings()
+            };
+            let levels = prepare(&grey(32, 32, 200), flags, &settings);
+            levels.iter().map(|level| level.rgba[0]).collect::<Vec<_>>()
         };
-        // 201 * 0.75 + 127 * 0.25 = 182.5, 182 * 0.5 + 127 * 0.5 = 154.5, 154 * 0.25 + 127 * 0.75 = 133.75
-        assert_eq!(
-            values("gfx/fx/detail/rock.tga"),
-            [201, 182, 154, 133, 127, 127]
-        );
-        assert_eq!(
-            values("textures/detail/rock.tga"),
-            [201, 182, 154, 133, 127, 127]
-        );
-        assert_eq!(values("textures/rock.tga"), [201; 5]);
+        // 200 * 3/4 + 127 / 4, half of that and half of 127, ...; and r_picmip does not apply
+        assert_eq!(values(true, detail), [200, 181, 154, 133, 127, 127]);
+        assert_eq!(values(false, detail), [200; 5]);
+        assert_eq!(values(true, ImageFlags::WORLD), [200; 5]);
     }
 
     #[test]

@@ -11,6 +11,8 @@ pub struct ImageFlags {
     pub picmip: bool,
     /// Clamped to its edge instead of repeated.
     pub clamp: bool,
+    /// The image of a detail stage, whose mip levels `r_detailFade` makes grey.
+    pub detail: bool,
 }
 
 impl ImageFlags {
@@ -19,12 +21,14 @@ impl ImageFlags {
         mipmap: true,
         picmip: true,
         clamp: false,
+        detail: false,
     };
     /// Flags of images registered without mip levels.
     pub const NO_MIP: Self = Self {
         mipmap: false,
         picmip: false,
         clamp: true,
+        detail: false,
     };
 }
 

@@ -319,7 +319,7 @@ impl Textures {
     }
 
     fn upload(&mut self, name: &str, image: &Image, flags: ImageFlags) -> Option<gpu::Image> {
-        let levels = prepare::prepare(name, image, flags, &self.settings);
+        let levels = prepare::prepare(image, flags, &self.settings);
         match self.create(name, &levels) {
             Ok(created) => {
                 if let Some(smallest) = levels.last() {
@@ -371,7 +371,6 @@ impl Textures {
 
     fn built_in(&mut self, name: &str, image: &Image) -> Result<u32, gpu::Error> {
         let levels = prepare::prepare(
-            name,
             image,
             ImageFlags {
                 picmip: false,
