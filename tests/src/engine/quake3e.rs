@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use libloading::Library;
 
-use super::abi::{cvar_t, glconfig_t};
+use super::abi::glconfig_t;
 use super::imports::{self, text, violation, with};
 
 type GetInstanceProcAddr = unsafe extern "C" fn(*mut c_void, *const c_char) -> *mut c_void;
@@ -97,7 +97,7 @@ pub(super) extern "C" fn cvar_variable_string_buffer(_: *const c_char, _: *mut c
 }
 
 pub(super) extern "C" fn cvar_variable_string(name: *const c_char) -> *const c_char {
-    let name = imports::text(name);
+    let name = text(name);
     with(|s| s.cvars.place_of_text(&name)).unwrap_or(ptr::null())
 }
 
