@@ -57,11 +57,10 @@ use_cargo() {
 }
 
 # engine_folder LIBRARY: a private folder in which the engine finds its own renderers and ours.
-# ioquake3 looks for renderer_NAME_ARCH.so in the folder of argv[0] before it looks elsewhere, so links are
-# all it takes: no system folder is touched and nothing needs root. Prints the folder.
+# ioquake3 looks for renderer_NAME_ARCH.so, since 2025 for renderer_NAME.so, in the folder of argv[0] before it looks
+# elsewhere, so links are all it takes: no system folder is touched and nothing needs root. Prints the folder.
 engine_folder() {
-  local library=$1 folder=$TARGET_DIR/engine arch renderer
-  arch=$(engine_arch)
+  local library=$1 folder=$TARGET_DIR/engine renderer
   [ -x "$ENGINE_DIR/ioquake3" ] || die "There is no ioquake3 in $ENGINE_DIR; run scripts/setup."
   mkdir -p "$folder"
   ln -sfn "$ENGINE_DIR/ioquake3" "$folder/ioquake3"
@@ -70,7 +69,7 @@ engine_folder() {
   done
   if [ -n "$library" ]; then
     [ -e "$library" ] || die "$library is not there; build it with: cargo build --release -p ffi"
-    ln -sfn "$(realpath "$library")" "$folder/renderer_vk_$arch.so"
+    for renderer in vk "vk_$(engine_arch)"; do ln -sfn "$(realpath "$library")" "$folder/renderer_$renderer.so"; done
   fi
   echo "$folder"
 }
