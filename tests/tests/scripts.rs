@@ -1,4 +1,4 @@
-//! How the scripts treat packs on their command line.
+//! How the scripts treat packs on their command line, and the manifests of package managers.
 
 use std::io::Write;
 use std::path::Path;
@@ -89,4 +89,64 @@ fn a_pack_is_added_to_the_game_without_a_change_to_its_folder() {
     assert_eq!(names(&joined), ["z_last.pk3", "~given.pk3"]);
     let linked = std::fs::canonicalize(joined.join("~given.pk3")).expect("a link");
     assert_eq!(linked, std::fs::canonicalize(&file).expect("a file"));
+}
+
+#[test]
+fn manifests_name_the_files_of_this_version() {
+    let root = tests::data::repository();
+    if !root.join(".git").exists() {
+        return testkit::skip("this is no git checkout");
+    }
+    let out = tempfile::tempdir().expect("a folder");
+    let out = out.path();
+    let version = env!("CARGO_PKG_VERSION");
+    let zip = format!("relight-{version}-windows-x86_64.zip");
+    std::fs::write(out.join(&zip), "abc").expect("written");
+    let output = Command::new(root.join("scripts/package"))
+        .args(["--only", "source,manifests", "--out"])
+        .arg(out)
+        .args(["--repository", "https://github.com/some-one/relight"])
+        .output()
+        .expect("bash runs");
+    assert!(output.status.success(), "{output:?}");
+    let read = |file: &str| std::fs::read_to_string(out.join(file)).expect(file);
+    // each file: what it must have, beside the address of the release's files
+    let download = format!("https://github.com/some-one/relight/releases/download/v{version}");
+    let source = format!("{download}/relight-{version}.tar.xz");
+    let sums = read("SHA256SUMS");
+    let sum_of = |file: &str| {
+        let line = sums.lines().find(|l| l.ends_with(&format!("  {file}")));
+        line.expect(file)[..64].to_owned()
+    };
+    let source_sum = sum_of(&format!("relight-{version}.tar.xz"));
+    // FIPS 180-2, appendix B.1
+    let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+    assert_eq!(sum_of(&zip), abc);
+    let has = |file: &str, parts: &[&str]| {
+        let text = read(file);
+        for part in parts {
+            assert!(text.contains(part), "{file} has no {part}:\n{text}");
+        }
+    };
+    let pkgver = format!("pkgver={version}\n");
+    has("aur/PKGBUILD", &[&pkgver, &source, &source_sum]);
+    let app = "io.github.some_one.relight";
+    let id = format!("id: {app}\n");
+    has(&format!("flatpak/{app}.yml"), &[&id, &source, &source_sum]);
+    let package = format!("PackageIdentifier: some-one.Relight\nPackageVersion: {version}\n");
+    for file in ["", ".locale.en-US"] {
+        has(&format!("winget/some-one.Relight{file}.yaml"), &[&package]);
+    }
+    let archive = format!("{download}/{zip}");
+    has(
+        "winget/some-one.Relight.installer.yaml",
+        &[&package, &archive, abc],
+    );
+
+    let crates = read("flatpak/cargo-sources.json");
+    let crates: serde_json::Value = serde_json::from_str(&crates).expect("JSON");
+    let lock = std::fs::read_to_string(root.join("Cargo.lock")).expect("Cargo.lock");
+    // an archive and its checksum for cargo
+    let sources = crates.as_array().map_or(0, Vec::len);
+    assert_eq!(sources, 2 * lock.matches("\nchecksum = ").count());
 }
