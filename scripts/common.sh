@@ -79,6 +79,7 @@ game_options=(
   +set com_basegame baseoa
   +set fs_basepath "$GAME_DIR"
   +set com_homepath .openarena
+  +set fs_homepath "$HOME/.openarena"
   +set com_legacyprotocol 71 +set com_protocol 71
   +set sv_master1 dpmaster.deathmask.net
   +set cl_motd 0
