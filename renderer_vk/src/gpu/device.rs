@@ -205,17 +205,20 @@ impl Device {
         if !lock(&self.0.pending).is_empty() {
             self.immediate(|_| Ok(()))?;
         }
-        {
-            let _queue = lock(&self.0.queue);
-            // SAFETY: the queue is held, so nothing is submitted meanwhile.
-            unsafe { self.0.core.raw.device_wait_idle() }.context("vkDeviceWaitIdle")?;
-        }
+        self.wait()?;
         self.0.collect()?;
         let spare = lock(&self.0.pending).take_spare();
         for (buffer, memory) in spare {
             self.0.destroy(Garbage::Buffer(buffer, memory));
         }
         Ok(())
+    }
+
+    /// Waits for all submitted work.
+    pub(crate) fn wait(&self) -> Result<(), Error> {
+        let _queue = lock(&self.0.queue);
+        // SAFETY: the queue is held, so nothing is submitted meanwhile.
+        unsafe { self.0.core.raw.device_wait_idle() }.context("vkDeviceWaitIdle")
     }
 
     /// The driver's pipeline cache, for [`DeviceOptions::pipeline_cache`] of a later run.

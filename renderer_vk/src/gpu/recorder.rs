@@ -372,9 +372,13 @@ impl Device {
         };
         let done = submitted.and_then(|()| {
             // SAFETY: the fence was submitted.
-            unsafe { vk.wait_for_fences(&[fence], true, u64::MAX) }.context("vkWaitForFences")
+            let waited = unsafe { vk.wait_for_fences(&[fence], true, u64::MAX) };
+            // The device may still execute the buffers, which the caller drops.
+            waited
+                .context("vkWaitForFences")
+                .or_else(|e| self.wait().and(Err(e)))
         });
-        // SAFETY: the wait is over, or the submission failed, or the device is lost.
+        // SAFETY: the submission failed, or its execution is over, or the device is lost.
         unsafe { vk.destroy_fence(fence, None) };
         done
     }

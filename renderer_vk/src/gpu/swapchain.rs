@@ -329,7 +329,7 @@ impl Swapchain {
         if let Some(available) = self.acquired.take() {
             self.swallow(available)?;
         }
-        self.wait_device()?;
+        self.device.wait()?;
         let device = self.device.clone();
         let Some(swapchains) = &device.0.swapchain else {
             return Err(Error::Surface(
@@ -434,12 +434,6 @@ impl Swapchain {
         .context("vkQueueSubmit")
     }
 
-    fn wait_device(&self) -> Result<(), Error> {
-        let _queue = lock(&self.device.0.queue);
-        // SAFETY: the queue is held.
-        unsafe { self.device.vk().device_wait_idle() }.context("vkDeviceWaitIdle")
-    }
-
     fn forget_images(&mut self) {
         for (image, finished) in self.images.drain(..) {
             drop(image);
@@ -454,7 +448,7 @@ impl Drop for Swapchain {
             Some(available) => self.swallow(available),
             None => Ok(()),
         };
-        if let Err(e) = over.and_then(|()| self.wait_device()) {
+        if let Err(e) = over.and_then(|()| self.device.wait()) {
             log::warn!("{e}");
         }
         self.forget_images();
