@@ -16,7 +16,7 @@ use super::instance::{Instance, SurfaceSource};
 use super::pin::pin_drivers;
 use super::pipeline_cache::{cache_from_bytes, cache_to_bytes};
 use super::render_pass::{FramebufferKey, RenderPassKey};
-use super::select::{self, Abilities, DeviceInfo};
+use super::select::{self, Abilities, Choice, DeviceInfo};
 use super::upload::Pending;
 
 /// Parameters of a [`Device`].
@@ -106,6 +106,21 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Makes the first device of a list for which the driver does so.
+fn create_first(instance: &Instance, choices: Vec<Choice>) -> Result<(Choice, ash::Device), Error> {
+    let mut failed = Error::NoDevice("the list is empty".to_owned());
+    for choice in choices {
+        match select::create_device(instance, &choice) {
+            Ok(raw) => return Ok((choice, raw)),
+            Err(error) => {
+                log::warn!("{} is not used: {error}", choice.info.name);
+                failed = error;
+            }
+        }
+    }
+    Err(failed)
+}
+
 impl Device {
     /// Selects a device and initializes it.
     ///
@@ -116,8 +131,7 @@ impl Device {
     /// One message that names the missing item: the loader, the surface, or the features that each device lacks.
     pub fn new(options: &DeviceOptions, source: SurfaceSource<'_>) -> Result<Self, Error> {
         let instance = Instance::new(&options.app_name, options.validation, source)?;
-        let choice = select::choose(&instance, options)?;
-        let raw = select::create_device(&instance, &choice)?;
+        let (choice, raw) = create_first(&instance, select::choose(&instance, options)?)?;
         pin_drivers(raw.fp_v1_0().queue_submit);
         let core = RawDevice { raw, instance };
         let a = choice.abilities;

@@ -118,46 +118,42 @@ pub(crate) struct Choice {
     pub info: DeviceInfo,
 }
 
-/// Selects among the devices that meet the requirements: the one that `prefer` names (part of its name, or its index),
-/// otherwise discrete before integrated before virtual before software.
-pub(crate) fn choose(instance: &Instance, options: &DeviceOptions) -> Result<Choice, Error> {
-    let prefer = options.prefer.as_deref();
+/// The devices that meet the requirements, best first: the one that `prefer` names (part of its name, or its index),
+/// then discrete before integrated before virtual before software.
+pub(crate) fn choose(instance: &Instance, options: &DeviceOptions) -> Result<Vec<Choice>, Error> {
     // SAFETY: the instance is alive.
     let devices = unsafe { instance.raw.enumerate_physical_devices() }
         .context("vkEnumeratePhysicalDevices")?;
     let mut refused = Vec::new();
     let mut usable: Vec<(usize, Choice)> = Vec::new();
     for (index, physical) in devices.into_iter().enumerate() {
-        match examine(instance, physical, options)? {
+        match examine(instance, physical, options) {
             Ok(choice) => usable.push((index, choice)),
             Err(reason) => refused.push(reason),
         }
     }
-    let best = usable
-        .iter()
-        .enumerate()
-        .max_by_key(|(order, (_, c))| (c.info.kind, std::cmp::Reverse(*order)))
-        .map(|(order, _)| order);
-    let wanted = prefer
-        .map(str::trim)
-        .filter(|p| !p.is_empty())
-        .and_then(|prefer| {
-            let lower = prefer.to_lowercase();
-            let number = prefer.parse::<usize>().ok();
-            let found = usable.iter().position(|(index, c)| {
-                number == Some(*index)
-                    || (number.is_none() && c.info.name.to_lowercase().contains(&lower))
-            });
-            if found.is_none() {
-                log::warn!("no usable Vulkan device matches `{prefer}`; the best one is used");
-            }
-            found
-        });
-    match wanted.or(best) {
-        Some(order) => Ok(usable.swap_remove(order).1),
-        None if refused.is_empty() => Err(Error::NoDevice("the drivers offer none".to_owned())),
-        None => Err(Error::NoDevice(refused.join("; "))),
+    if usable.is_empty() {
+        let none = || "the drivers offer none".to_owned();
+        let reasons = Some(refused.join("; ")).filter(|r| !r.is_empty());
+        return Err(Error::NoDevice(reasons.unwrap_or_else(none)));
     }
+    let prefer = options.prefer.as_deref().map(str::trim).unwrap_or_default();
+    let wanted = |index: usize, choice: &Choice| match prefer.parse::<usize>() {
+        Ok(number) => number == index,
+        Err(_) => choice
+            .info
+            .name
+            .to_lowercase()
+            .contains(&prefer.to_lowercase()),
+    };
+    let found = (usable.iter())
+        .find(|(i, c)| !prefer.is_empty() && wanted(*i, c))
+        .map(|(i, _)| *i);
+    if found.is_none() && !prefer.is_empty() {
+        log::warn!("no usable Vulkan device matches `{prefer}`; the best one is used");
+    }
+    usable.sort_by_key(|(i, c)| std::cmp::Reverse((Some(*i) == found, c.info.kind)));
+    Ok(usable.into_iter().map(|(_, choice)| choice).collect())
 }
 
 /// Makes the logical device with all features in `choice.abilities`.

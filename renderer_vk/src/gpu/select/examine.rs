@@ -21,19 +21,20 @@ pub(super) fn examine(
     instance: &Instance,
     physical: vk::PhysicalDevice,
     options: &DeviceOptions,
-) -> Result<Result<Choice, String>, Error> {
+) -> Result<Choice, String> {
     // SAFETY: the physical device belongs to the live instance.
     let properties = unsafe { instance.raw.get_physical_device_properties(physical) };
     let name = device_name(&properties);
     // Only devices of version 1.2 accept queries of its features and properties.
     if properties.api_version < vk::API_VERSION_1_2 {
-        return Ok(Err(format!(
+        return Err(format!(
             "{name} offers Vulkan {}.{}, 1.2 is needed",
             vk::api_version_major(properties.api_version),
             vk::api_version_minor(properties.api_version)
-        )));
+        ));
     }
-    let extensions = Extensions::of(instance, physical, options)?;
+    let failed = |error: Error| format!("{name}: {error}");
+    let extensions = Extensions::of(instance, physical, options).map_err(failed)?;
     let features = Features::of(instance, physical, extensions);
     let mut missing = features.missing();
     if properties.limits.max_compute_work_group_invocations < GROUP {
@@ -43,12 +44,12 @@ pub(super) fn examine(
         missing.push("VK_KHR_swapchain");
     }
     if !missing.is_empty() {
-        return Ok(Err(format!("{name} lacks {}", missing.join(", "))));
+        return Err(format!("{name} lacks {}", missing.join(", ")));
     }
-    let Some(queue) = QueueFamily::of(instance, physical)? else {
-        return Ok(Err(format!(
+    let Some(queue) = QueueFamily::of(instance, physical).map_err(failed)? else {
+        return Err(format!(
             "{name} has no queue for graphics and compute that can show pictures in the window"
-        )));
+        ));
     };
     let limits = Limits::of(instance, physical, extensions);
     let mut abilities = if options.required_only {
@@ -58,14 +59,14 @@ pub(super) fn examine(
     };
     // A pipeline that does not allow `traceRayEXT` is useless.
     abilities.pipeline &= limits.pipeline.max_ray_recursion_depth > 0;
-    Ok(Ok(Choice {
+    Ok(Choice {
         physical,
         queue_family: queue.index,
         timestamp_bits: queue.timestamp_bits,
         timestamp_period: properties.limits.timestamp_period,
         abilities,
         info: info(name, &properties, &limits, abilities, &queue),
-    }))
+    })
 }
 
 fn device_name(properties: &vk::PhysicalDeviceProperties) -> String {
