@@ -93,7 +93,7 @@ pub unsafe extern "C" fn begin_registration(out: *mut glconfig_t) {
             renderer.keep_calibrations(cache_folder);
             renderer
                 .begin_registration(files, &front.settings)
-                .map_err(|e| Failure::fatal(format!("Relight cannot start: {e}")))
+                .map_err(|e| cannot_start(engine, e.to_string()))
         })
         .unwrap_or(Ok(()))
     });
@@ -148,14 +148,17 @@ fn start_renderer(
         }
         Err(message) => {
             window::close(engine, window::Closing::Video);
-            Err(Failure::fatal(format!(
-                "Relight cannot start: {message}. Start the game with \"+set cl_renderer {}\" to play without it.",
-                engine
-                    .front_end()
-                    .map_or("opengl1", |front| front.opengl[0])
-            )))
+            Err(cannot_start(engine, message))
         }
     }
+}
+
+/// The end of the game, with the way to play without this renderer.
+fn cannot_start(engine: Engine, message: String) -> Failure {
+    let other = (engine.front_end()).map_or("opengl1", |front| front.opengl[0]);
+    Failure::fatal(format!(
+        "Relight cannot start: {message}. Start the game with \"+set cl_renderer {other}\" to play without it."
+    ))
 }
 
 fn make_renderer(

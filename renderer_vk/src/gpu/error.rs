@@ -15,7 +15,7 @@ pub enum Error {
     /// The window system provided no surface, or a required instance extension is absent.
     #[error("no Vulkan surface: {0}")]
     Surface(String),
-    /// Memory for `what` is exhausted.
+    /// The allocator has no memory for `what`.
     #[error("out of GPU memory for `{what}` ({bytes} bytes): {reason}")]
     OutOfMemory {
         /// Name of the object to be made.
@@ -74,13 +74,6 @@ impl<T> Context<T> for Result<T, vk::Result> {
     fn context(self, call: &'static str) -> Result<T, Error> {
         self.map_err(|result| match result {
             vk::Result::ERROR_DEVICE_LOST => Error::DeviceLost(call),
-            vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
-                Error::OutOfMemory {
-                    what: call.to_owned(),
-                    bytes: 0,
-                    reason: result.to_string(),
-                }
-            }
             result => Error::Vulkan { call, result },
         })
     }
