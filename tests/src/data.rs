@@ -26,13 +26,21 @@ pub fn library() -> PathBuf {
 }
 
 fn find_library() -> PathBuf {
-    if let Some(path) = std::env::var_os("RELIGHT_LIBRARY") {
-        return PathBuf::from(path);
+    match std::env::var_os("RELIGHT_LIBRARY") {
+        Some(path) => PathBuf::from(path),
+        None => built("ffi", "relight_ffi"),
     }
+}
+
+/// The dynamic library of a crate of the workspace, brought up to date.
+///
+/// # Panics
+/// When it does not build.
+pub fn built(package: &str, library: &str) -> PathBuf {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut build = Command::new(cargo);
     build
-        .args(["build", "--quiet", "-p", "ffi"])
+        .args(["build", "--quiet", "-p", package])
         .current_dir(repository());
     // <target>/<profile>/deps/<test> or <target>/<profile>/<program>
     let program = std::env::current_exe().expect("the path of this program");
@@ -45,8 +53,8 @@ fn find_library() -> PathBuf {
         build.arg("--release");
     }
     let status = build.status().expect("cargo runs");
-    assert!(status.success(), "cargo build -p ffi failed");
-    let file = format!("{DLL_PREFIX}relight_ffi{DLL_SUFFIX}");
+    assert!(status.success(), "cargo build -p {package} failed");
+    let file = format!("{DLL_PREFIX}{library}{DLL_SUFFIX}");
     let library = profile.join(file);
     assert!(library.is_file(), "cargo built no {}", library.display());
     library

@@ -6,6 +6,7 @@
 //! * [`data`]: where OpenArena's data, the library and the tools are, and when a test may be skipped.
 //! * [`maps`]: small maps made by the tests.
 //! * [`camera_path`]: a recorded path through the library, measured.
+//! * [`layer`]: sessions on devices with limits and with calls that fail.
 //! * [`gallery`]: scenes that the engine's own renderer and ours draw alike, in a private [`display`].
 
 #![deny(unsafe_code)]
@@ -16,6 +17,7 @@ pub mod display;
 #[allow(unsafe_code)]
 pub mod engine;
 pub mod gallery;
+pub mod layer;
 pub mod maps;
 pub mod real;
 pub mod roq;
