@@ -48,7 +48,8 @@ pub fn main(run: impl Fn() -> Result<ExitCode>) -> ExitCode {
 pub fn parse<C: Parser>(replaced: &[(&str, &str, &str)]) -> C {
     C::try_parse().unwrap_or_else(|error| {
         let name = C::command().get_name().to_owned();
-        let words: Vec<String> = std::env::args().skip(1).collect();
+        let words = std::env::args_os().skip(1);
+        let words: Vec<_> = words.map(|w| w.to_string_lossy().into_owned()).collect();
         match replacement(&error, &words, replaced) {
             Some((subcommand, old, new)) => {
                 let written = [&name, subcommand, old].join(" ");

@@ -9,7 +9,7 @@
 //! Each function that the engine calls (an *export*: the table of exports, console commands, callbacks) is an `unsafe
 //! extern "C" fn`. Its `# Safety` section has the requirements on its arguments. These hold for all exports:
 //! - **Thread.** The engine calls on the thread that called `GetRefAPI`. On any other thread [`entry`] does nothing and
-//!   returns 0; no argument is read.
+//!   returns 0; no argument is read. The first such call writes a line to the standard error output.
 //! - **Memory.** An export uses a pointer only during the call, unless its section states otherwise; no other code
 //!   writes to that memory meanwhile. The memory of game modules is not aligned, so that exports use unaligned
 //!   accesses.
@@ -47,7 +47,9 @@ use crate::{engine, logging, session};
 use std::any::Any;
 use std::cell::UnsafeCell;
 use std::ffi::{c_char, c_int};
+use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Maximum length of a message that the engine copies, bytes.
 const MESSAGE_BYTES: usize = 4096;
@@ -94,6 +96,7 @@ fn panic_text(payload: &(dyn Any + Send)) -> &str {
 /// `GetRefAPI` are refused.
 pub fn entry<R: Copy + Default>(f: impl FnOnce() -> Result<R, Failure>) -> R {
     if !session::on_main_thread() {
+        warn_of_thread();
         return R::default();
     }
     match guarded(f) {
@@ -107,6 +110,20 @@ pub fn entry<R: Copy + Default>(f: impl FnOnce() -> Result<R, Failure>) -> R {
             // Reached only with an engine that has no error function.
             R::default()
         }
+    }
+}
+
+/// Reports once a call from a thread other than that of `GetRefAPI`, past the engine, whose services are the main
+/// thread's.
+#[inline(never)]
+fn warn_of_thread() {
+    static DONE: AtomicBool = AtomicBool::new(false);
+    if !DONE.swap(true, Ordering::Relaxed) {
+        // Nothing is lost without a reader.
+        let _ = writeln!(
+            std::io::stderr(),
+            "Relight draws nothing for a thread that did not call GetRefAPI"
+        );
     }
 }
 

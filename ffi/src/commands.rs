@@ -46,6 +46,8 @@ static COMMANDS: &[(&CStr, Function)] = &[
 
 /// Adds all commands.
 pub fn add(engine: Engine) {
+    // An engine that began anew without `Shutdown` has the old ones.
+    remove(engine);
     for &(name, function) in COMMANDS {
         engine.add_command(name, function);
     }

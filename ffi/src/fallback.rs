@@ -116,16 +116,16 @@ unsafe fn load_from(
                     continue;
                 }
             };
+            // SAFETY: only its presence is tested.
+            if unsafe { library.get::<*const u8>(crate::MARK) }.is_ok() {
+                continue;
+            }
             // SAFETY: the symbol has this signature in every renderer of this engine.
             let Ok(get_ref_api) =
                 (unsafe { library.get::<GetRefApi>(b"GetRefAPI\0") }).map(|symbol| *symbol)
             else {
                 continue;
             };
-            if std::ptr::fn_addr_eq(get_ref_api, crate::GetRefAPI as GetRefApi) {
-                // This library, installed under that name.
-                continue;
-            }
             // SAFETY: `table` is valid for this renderer by this function's contract; it copies the table.
             let exports = unsafe { get_ref_api(api_version, table) };
             if exports.is_null() {

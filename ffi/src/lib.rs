@@ -5,7 +5,7 @@
 //! console commands, screenshots.
 //!
 //! # The contract with the engine
-//! - One exported symbol, [`GetRefAPI`]. Everything runs on the thread that called it; calls on other threads are
+//! - One exported function, [`GetRefAPI`]. Everything runs on the thread that called it; calls on other threads are
 //!   refused.
 //! - The library stays mapped after the engine unloads it (`-z nodelete`, on Windows `system::pin`), because code that has run a thread cannot be
 //!   unmapped safely. Statics therefore outlive an unload, and each `GetRefAPI` resets all state. No thread outlives a
@@ -80,3 +80,11 @@ pub unsafe extern "C" fn GetRefAPI(api_version: c_int, imports: *const c_void) -
     // SAFETY: `imports` is null or an engine's table, and the thread is the main one, by this function's contract.
     unsafe { load::get_ref_api(api_version, imports) }
 }
+
+/// A symbol of this library alone: no copy of it, under any file name, is a substitute for it (`fallback`).
+#[allow(non_upper_case_globals)]
+#[unsafe(no_mangle)]
+pub static RelightRenderer: u8 = 1;
+
+/// The name of [`RelightRenderer`].
+const MARK: &[u8] = b"RelightRenderer\0";

@@ -1,9 +1,9 @@
 //! `GetRefAPI`: recognizes the engine, resets the state and returns the functions for it.
 
-use crate::abi::functions::Printf;
 use crate::engine::{self, Table};
 use crate::{fallback, lifecycle, logging, recognize, session, system, window};
 use std::ffi::{c_int, c_void};
+use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr;
 
@@ -19,13 +19,17 @@ const API_VERSION: c_int = 8;
 /// must be callable until the process ends. The call must come from the engine's main thread while none of our
 /// functions runs.
 pub unsafe fn get_ref_api(api_version: c_int, imports: *const c_void) -> *const c_void {
-    if imports.is_null() {
+    // SAFETY: null or an engine's table by this function's contract.
+    let Some(printf) = (unsafe { recognize::printf(imports) }) else {
+        // Nothing is lost without a reader.
+        let _ = writeln!(
+            std::io::stderr(),
+            "Relight: GetRefAPI got no table of services"
+        );
         return ptr::null();
-    }
-    // SAFETY: not null, so it is an engine's table by this function's contract, and `Printf` is its first entry.
-    let printf = unsafe { imports.cast::<Option<Printf>>().read_unaligned() };
+    };
     let only_print = Table {
-        printf,
+        printf: Some(printf),
         ..Table::EMPTY
     };
     // SAFETY: an engine calls this on its main thread, with none of our functions running.

@@ -8,9 +8,12 @@
 //! 4. what remains has `Cvar_Get` and the first members of a variable in the same places: each front end tests a
 //!    property of its engine ([`FrontEnd::recognizes`]).
 //!
-//! In 2 to 4 the entries of the table must be functions or null, and no functions may follow far beyond its end. A test
-//! whose data cannot be read (an unreadable file, on Unix no `/proc`) is skipped.
+//! In 2 to 4 the entries of the table must be functions or null, no functions may follow far beyond its end, the
+//! services without which nothing can be drawn must be there, and the text and the number of a variable must agree. A
+//! test whose data cannot be read (an unreadable file, on Unix no `/proc`) is skipped.
 
+use crate::abi::functions::Printf;
+use crate::cvars;
 use crate::engine::{Engine, FrontEnd};
 use crate::front_ends::{FRONT_ENDS, UNSUPPORTED};
 use crate::system;
@@ -56,15 +59,22 @@ pub unsafe fn recognize(imports: *const c_void) -> Result<Engine, String> {
         // SAFETY: the player says that it is this engine's table; the rest is this function's contract.
         return Ok(unsafe { (front.install)(imports) });
     }
-    let code = system::code();
+    let code = code();
     match by_file_name().or_else(executable) {
         Some(Found::Supported(front)) => match odd_table(front, imports, &code) {
             Some(odd) => Err(refusal(
                 &format!("it looks like {}, but {odd}", front.name),
                 front.opengl[0],
             )),
-            // SAFETY: this engine's table by its file, and it has as many functions; the rest is our contract.
-            None => Ok(unsafe { (front.install)(imports) }),
+            None => {
+                // SAFETY: this engine's table by its file, and it has as many functions; the rest is our contract.
+                let engine = unsafe { (front.install)(imports) };
+                let odd = odd_services(engine, &code);
+                odd.map_or(Ok(engine), |odd| {
+                    let found = format!("it looks like {}, but {odd}", front.name);
+                    Err(refusal(&found, front.opengl[0]))
+                })
+            }
         },
         Some(Found::Other(name, opengl)) => Err(refusal(&format!("it is {name}"), opengl)),
         // SAFETY: this function's contract; the engine is none of those with another place for `Cvar_Get`.
@@ -88,13 +98,17 @@ unsafe fn by_properties(imports: *const c_void, code: &[Range<usize>]) -> Result
         }
         // SAFETY: the tables of these engines are equal in the entries that `recognizes` calls.
         let engine = unsafe { (front.install)(imports) };
+        if let Some(odd) = odd_services(engine, code) {
+            found.get_or_insert(odd);
+            continue;
+        }
         if recognizes(engine) {
             return Ok(engine);
         }
-        found = Some(format!(
-            "its version is \"{}\"",
-            engine.cvar_text(c"version")
-        ));
+        found.get_or_insert_with(|| {
+            let version = engine.cvar_text(c"version");
+            format!("its version is \"{version}\"")
+        });
     }
     Err(refusal(&found.unwrap_or_default(), OPENGL))
 }
@@ -186,6 +200,41 @@ fn odd_words(front: &FrontEnd, words: &[usize], code: &[Range<usize>]) -> Option
             front.name
         )
     })
+}
+
+/// Description of a service that is absent, or of a variable that the engine's code cannot have made.
+fn odd_services(engine: Engine, code: &[Range<usize>]) -> Option<String> {
+    if let Some(name) = engine.missing_service() {
+        return Some(format!("its table has no {name}"));
+    }
+    let spec = &renderer_vk::settings::row("r_rt")?.spec;
+    let agrees =
+        cvars::get(engine, spec).is_some_and(|variable| engine.cvar_is_consistent(variable));
+    (!agrees && !code.is_empty()).then(|| "its variables have another layout".to_owned())
+}
+
+/// `Printf`, the first service of every table; `None` if there is no table at this address.
+///
+/// # Safety
+/// `imports` must be null or point at the import table of an engine.
+pub unsafe fn printf(imports: *const c_void) -> Option<Printf> {
+    let code = code();
+    let is_function = |word: &usize| code.iter().any(|range| range.contains(word));
+    let known = imports.is_null() || !code.is_empty();
+    if known && !words_at(imports.addr(), 1).first().is_some_and(is_function) {
+        return None;
+    }
+    // SAFETY: not null, so an engine's table by this function's contract, whose first entry has this type in all engines.
+    unsafe { imports.cast::<Option<Printf>>().read_unaligned() }
+}
+
+/// Address ranges of the process that hold code; empty if its memory cannot be inspected.
+fn code() -> Vec<Range<usize>> {
+    let mut code = system::code();
+    if words_at(code.as_ptr().addr(), 1).is_empty() {
+        code.clear();
+    }
+    code
 }
 
 /// The words at an address, as far as they are readable.

@@ -77,6 +77,19 @@ fn cut_off_maps_drop_the_game() {
 }
 
 #[test]
+fn a_pack_that_the_engine_cannot_read_drops_the_game() {
+    let mut engine = engine_with(vec![]);
+    for file in [ROOMS, "textures/test/wall.tga", "scripts/test.shader"] {
+        engine.set_damaged(Some(file));
+        let raised = engine.start_map(ROOMS).expect_err(file);
+        assert_eq!((raised.level, raised.message.as_str()), (1, "damaged pack"));
+        engine.set_damaged(None);
+        engine.start_map(ROOMS).expect("the file is whole again");
+    }
+    assert_goes_on(&mut engine);
+}
+
+#[test]
 fn a_map_of_another_kind_is_named() {
     let mut other = maps::files().remove(0).1;
     other[4] = 99;

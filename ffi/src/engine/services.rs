@@ -35,6 +35,17 @@ fn in_c_pieces(text: &str, mut f: impl FnMut(*const c_char)) {
     }
 }
 
+/// The number at the start of the text, as C's `atoi` reads it; 0 if there is none.
+fn whole_number(text: &str) -> c_int {
+    let text = text.trim_start();
+    let is_part =
+        |(at, c): &(usize, char)| c.is_ascii_digit() || *at == 0 && matches!(c, '+' | '-');
+    let end = text.char_indices().take_while(is_part).count();
+    text.get(..end)
+        .and_then(|digits| digits.parse().ok())
+        .unwrap_or(0)
+}
+
 /// A service that is missing in the engine's table does nothing and returns an empty value.
 impl Engine {
     /// One entry of the table.
@@ -71,6 +82,20 @@ impl Engine {
     /// The engine's error function, which does not return.
     pub fn error_function(self) -> Option<unsafe extern "C" fn(c_int, *const c_char, ...)> {
         self.get(|t| t.error)
+    }
+
+    /// The first absent service of those without which nothing can be drawn.
+    pub fn missing_service(self) -> Option<&'static str> {
+        let present = self.get(|t| {
+            [
+                ("Error", t.error.is_some()),
+                ("Cvar_Get", t.cvar_get.is_some()),
+                ("FS_ReadFile", t.fs_read_file.is_some()),
+                ("FS_FreeFile", t.fs_free_file.is_some()),
+            ]
+        });
+        let mut absent = present.into_iter().filter(|(_, present)| !present);
+        absent.next().map(|(name, _)| name)
     }
 
     /// Engine time in milliseconds (scaled by `timescale`).
@@ -139,6 +164,35 @@ impl Engine {
         // SAFETY: a member of a variable of the engine, which only this thread changes; its text is NUL-terminated and
         // is copied before any change.
         unsafe { string_from(*self.member(cvar, |layout| layout.string)) }
+    }
+
+    /// Whether the variable's text is readable, and its integer is that of the text: in a variable of another layout they
+    /// are not. The memory is read through the kernel, because it may be anything.
+    pub fn cvar_is_consistent(self, cvar: Variable) -> bool {
+        const LONGEST: usize = 256;
+        let read =
+            |address: usize, bytes: &mut [u8]| system::read_memory(address, bytes) == bytes.len();
+        let string = self.member::<*const c_char>(cvar, |layout| layout.string);
+        let integer = self.member::<c_int>(cvar, |layout| layout.integer);
+        let (mut address, mut number) = ([0; size_of::<usize>()], [0; size_of::<c_int>()]);
+        if !read(string.addr(), &mut address) || !read(integer.addr(), &mut number) {
+            return false;
+        }
+        let start = usize::from_ne_bytes(address);
+        let mut text = Vec::new();
+        // by bytes, because the page after the text may be unmapped
+        while text.len() < LONGEST {
+            let mut byte = [0];
+            if !read(start.wrapping_add(text.len()), &mut byte) {
+                return false;
+            }
+            if byte == [0] {
+                return whole_number(&String::from_utf8_lossy(&text))
+                    == c_int::from_ne_bytes(number);
+            }
+            text.extend(byte);
+        }
+        false
     }
 
     /// The value as a path of the file system.

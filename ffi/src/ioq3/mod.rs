@@ -7,8 +7,8 @@ mod exports;
 #[cfg(test)]
 pub(crate) use exports::call_everything as call_everything_for_tests;
 
-use crate::cvars;
 use crate::engine::{self, Engine, FrontEnd, Table, renderer_made_window, variable_layout};
+use crate::{cvars, system};
 use abi::{cvar_t, refexport_t, refimport_t};
 use exports::EXPORTS;
 use std::ffi::c_void;
@@ -56,17 +56,16 @@ fn keeps_descriptions(engine: Engine) -> bool {
         return false;
     };
     let Some(variable) = cvars::get(engine, spec) else {
-        // without variables there is nothing to compare; such a table is accepted
-        return true;
+        return false;
     };
     let text = cvars::c_text(spec.help);
     engine.cvar_describe(variable, &text);
     // SAFETY: the engine's own variable; in the other engines of the family, too, it has a member at this offset.
-    let kept = unsafe { (*variable.as_ptr().cast::<cvar_t>()).description }.cast::<u8>();
-    let mut bytes = text.to_bytes_with_nul().iter().enumerate();
-    // SAFETY: bytes are read up to the first difference: in a copy of the text, its zero is the last byte read; in other
-    // engines the pointer is to a variable, which is larger than the matching part.
-    !kept.is_null() && bytes.all(|(i, &byte)| unsafe { *kept.add(i) } == byte)
+    let kept = unsafe { (*variable.as_ptr().cast::<cvar_t>()).description };
+    // Through the kernel, because in other engines the pointer may be to anything.
+    let mut copy = vec![0; text.to_bytes_with_nul().len()];
+    system::read_memory(kept.addr(), &mut copy);
+    copy == text.to_bytes_with_nul()
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use std::ptr;
 use std::rc::Rc;
 use std::time::Instant;
 
-use super::abi::{ERR_FATAL, cvar_t, glconfig_t, quake3e, refexport_t, tremulous};
+use super::abi::{ERR_DROP, ERR_FATAL, cvar_t, glconfig_t, quake3e, refexport_t, tremulous};
 use super::cvars::Cvars;
 use super::files::Files;
 use super::memory::Memory;
@@ -85,6 +85,8 @@ pub(super) struct State {
     pub raised: Option<(i32, String)>,
     /// An error is being handled: another one ends a real process.
     pub handling: bool,
+    /// A file in a damaged pack: reading it ends in an error of the engine.
+    pub damaged: Option<String>,
     /// `BeginRegistration` has returned since the last `Shutdown`.
     pub registered: bool,
     pub started: Instant,
@@ -353,6 +355,12 @@ pub(super) extern "C" fn fs_read_file(name: *const c_char, buffer: *mut *mut c_v
     if name.is_empty() || name.len() >= 64 {
         // An empty name ends a real process; a long one is cut.
         violation(format!("FS_ReadFile({name:?})"));
+        return -1;
+    }
+    if with(|s| s.damaged.as_ref() == Some(&name)) == Some(true) {
+        drop(name);
+        // SAFETY: a format without arguments; this frame owns nothing.
+        unsafe { stand_in_raise(ERR_DROP, c"damaged pack".as_ptr()) };
         return -1;
     }
     let Some(bytes) = with(|s| s.files.read(&name)).flatten() else {

@@ -56,6 +56,11 @@ impl Engine {
         imports::with(|s| *s.config).unwrap_or_else(|| unsafe { std::mem::zeroed() })
     }
 
+    /// Makes reading this file an error of the engine, and of no other file.
+    pub fn set_damaged(&mut self, name: Option<&str>) {
+        imports::with(|s| s.damaged = name.map(str::to_owned));
+    }
+
     /// Adds or replaces a game file.
     pub fn insert_file(&mut self, name: &str, bytes: Vec<u8>) {
         imports::with(|s| s.files.insert(name, bytes));

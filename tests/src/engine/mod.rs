@@ -14,8 +14,10 @@ mod exports;
 pub mod files;
 mod imports;
 mod inspection;
+mod lies;
 pub mod memory;
 mod quake3e;
+mod surface;
 mod tremulous;
 
 use std::ffi::{CString, c_void};
@@ -28,11 +30,12 @@ use libloading::Library;
 use tempfile::TempDir;
 use thiserror::Error;
 
-use abi::{GetRefAPI, REF_API_VERSION, openarena, refEntity_t, refexport_t};
+use abi::{GetRefAPI, openarena, refEntity_t, refexport_t};
 pub use exports::View;
 use files::{Files, Packs};
 use imports::{Film, State};
 pub use imports::{Message, Tables};
+pub use lies::Lies;
 pub use quake3e::has_surfaces;
 
 /// An error that the renderer raised through the engine's `Error`.
@@ -76,6 +79,8 @@ pub struct Options {
     pub clock: Option<i32>,
     /// The engine whose services are offered.
     pub tables: Tables,
+    /// What it does wrong.
+    pub lies: Lies,
 }
 
 /// One engine process at a time: the library has one state.
@@ -86,6 +91,7 @@ pub struct Engine {
     library: Option<Library>,
     source: Source,
     tables: Tables,
+    lies: Lies,
     home: TempDir,
     _process: MutexGuard<'static, ()>,
 }
@@ -251,6 +257,16 @@ fn library_of(tables: Tables) -> PathBuf {
     copy.clone()
 }
 
+/// Loads a renderer.
+fn open_library(path: &Path) -> Result<(Library, GetRefAPI), LoadError> {
+    let failed = |e| LoadError::Library(path.to_path_buf(), e);
+    // SAFETY: the library's initializers are those of a Rust cdylib.
+    let library = unsafe { Library::new(path) }.map_err(failed)?;
+    // SAFETY: the symbol has this signature by the engine's interface.
+    let entry = *unsafe { library.get::<GetRefAPI>(b"GetRefAPI\0") }.map_err(failed)?;
+    Ok((library, entry))
+}
+
 /// `BeginRegistration` and what the engine registers right after it.
 fn begin_registration(exports: refexport_t) -> Result<(), Raised> {
     let Some(config) = imports::with(|s| &raw mut *s.config) else {
@@ -348,6 +364,7 @@ impl Engine {
             messages: Vec::new(),
             raised: None,
             handling: false,
+            damaged: None,
             registered: false,
             started: Instant::now(),
             clock: options.clock,
@@ -380,6 +397,7 @@ impl Engine {
             library: None,
             source,
             tables: options.tables,
+            lies: options.lies,
             home,
             _process: process,
         };
@@ -387,26 +405,17 @@ impl Engine {
         Ok(engine)
     }
 
-    fn load_library(&mut self) -> Result<(), LoadError> {
+    /// Loads the library and calls `GetRefAPI`, also if both were done before.
+    pub fn load_library(&mut self) -> Result<(), LoadError> {
         let get_ref_api = match &self.source {
             Source::Linked(entry) => *entry,
             Source::Library(path) => {
-                let failed = |e| LoadError::Library(path.clone(), e);
-                // SAFETY: the library's initializers are those of a Rust cdylib.
-                let library = unsafe { Library::new(path) }.map_err(failed)?;
-                // SAFETY: the symbol has this signature by the engine's interface.
-                let entry = *unsafe { library.get::<GetRefAPI>(b"GetRefAPI\0") }.map_err(failed)?;
+                let (library, entry) = open_library(path)?;
                 self.library = Some(library);
                 entry
             }
         };
-        // The engine passes a structure on its stack and the renderer has to copy it; ours is overwritten below.
-        let mut table = imports::words(self.tables);
-        let place = &raw mut table;
-        // SAFETY: the table outlives the call.
-        let exports = call(move || unsafe { get_ref_api(REF_API_VERSION, place.cast()) })?;
-        // SAFETY: it must not be read any more, and calls through zeros crash.
-        unsafe { std::ptr::write_bytes(place, 0, 1) };
+        let exports = lies::get_ref_api(get_ref_api, self.tables, &self.lies)?;
         if exports.is_null() {
             let printed = self.messages().into_iter().map(|m| m.text).collect();
             return Err(LoadError::Refused(printed));
@@ -414,6 +423,12 @@ impl Engine {
         // SAFETY: not NULL, so it is the renderer's table.
         unsafe { keep_exports(self.tables, exports) };
         Ok(())
+    }
+
+    /// Loads another library for a moment and calls its `GetRefAPI`. Returns whether it serves this engine.
+    pub fn load_beside(&mut self, library: &Path) -> Result<bool, LoadError> {
+        let (_library, entry) = open_library(library)?;
+        Ok(!lies::get_ref_api(entry, self.tables, &self.lies)?.is_null())
     }
 
     /// `BeginRegistration`, and the console's own shaders.

@@ -1,4 +1,4 @@
-//! The services that Quake3e alone offers, or with other types. Its window has a Vulkan surface without a display.
+//! The services that Quake3e alone offers, or with other types.
 
 use std::ffi::{CStr, c_char, c_int, c_long, c_uchar, c_void};
 use std::ptr;
@@ -8,6 +8,7 @@ use libloading::Library;
 
 use super::abi::glconfig_t;
 use super::imports::{self, text, violation, with};
+use super::surface;
 
 type GetInstanceProcAddr = unsafe extern "C" fn(*mut c_void, *const c_char) -> *mut c_void;
 
@@ -171,6 +172,7 @@ pub(super) extern "C" fn opengl_function(_name: *const c_char) -> *mut c_void {
 /// A window of 320x240.
 pub(super) extern "C" fn open_window(config: *mut glconfig_t) {
     event("open");
+    surface::open(320, 240);
     // SAFETY: the renderer passes a structure, which is its own for as long as the window is open.
     let config = unsafe { &mut *config };
     (config.vidWidth, config.vidHeight) = (320, 240);
@@ -181,6 +183,7 @@ pub(super) extern "C" fn open_window(config: *mut glconfig_t) {
 
 pub(super) extern "C" fn close_window(unload: c_int) {
     event(format!("close {unload}"));
+    surface::close();
 }
 
 pub(super) extern "C" fn instance_function(
@@ -191,7 +194,7 @@ pub(super) extern "C" fn instance_function(
     loader().map_or(ptr::null_mut(), |get| unsafe { get(instance, name) })
 }
 
-/// Whether the Vulkan loader offers `VK_EXT_headless_surface`, without which this engine has no surface.
+/// Whether the Vulkan loader offers the extension for surfaces of this engine's window.
 pub fn has_surfaces() -> bool {
     /// `VkExtensionProperties`.
     #[repr(C)]
@@ -217,31 +220,11 @@ pub fn has_surfaces() -> bool {
     let failed = unsafe { enumerate(ptr::null(), &mut count, found.as_mut_ptr()) } < 0;
     let mut found = found.iter().take(count as usize).filter(|_| !failed);
     // SAFETY: names are NUL-terminated.
-    found.any(|e| unsafe { CStr::from_ptr(e.name.as_ptr()) } == c"VK_EXT_headless_surface")
+    found.any(|e| unsafe { CStr::from_ptr(e.name.as_ptr()) } == surface::EXTENSION)
 }
 
-/// A surface of `VK_EXT_headless_surface`.
+/// A surface of the window.
 pub(super) extern "C" fn create_surface(instance: *mut c_void, surface: *mut u64) -> c_int {
-    /// `VkHeadlessSurfaceCreateInfoEXT`.
-    #[repr(C)]
-    struct Info {
-        kind: c_int,
-        next: *const c_void,
-        flags: u32,
-    }
-    type Create = unsafe extern "C" fn(*mut c_void, *const Info, *const c_void, *mut u64) -> c_int;
     event("surface");
-    let function = instance_function(instance, c"vkCreateHeadlessSurfaceEXT".as_ptr());
-    if function.is_null() {
-        return 0;
-    }
-    // SAFETY: the function of that name has this type.
-    let create = unsafe { std::mem::transmute::<*mut c_void, Create>(function) };
-    let info = Info {
-        kind: 1_000_256_000,
-        next: ptr::null(),
-        flags: 0,
-    };
-    // SAFETY: the renderer's instance, and a place for the surface.
-    c_int::from(unsafe { create(instance, &info, ptr::null(), surface) } == 0)
+    surface::create(instance, surface).into()
 }

@@ -5,6 +5,7 @@
 mod answers;
 mod captures;
 mod game;
+mod odd_engines;
 mod pictures;
 mod quake3e;
 mod session;

@@ -11,13 +11,17 @@ fn pictures_are_clipped_to_a_region() {
         ..options()
     })
     .expect("the library starts");
-    let white = engine.register_shader_no_mip("white").unwrap();
+    let white = engine
+        .register_shader_no_mip("textures/test/white")
+        .unwrap();
     let mut drawn = |region| {
-        engine.set_clip_region(region).unwrap();
         let picture = engine.picture_of(|engine| {
+            // a frame of pictures alone begins with the last one
+            engine.set_clip_region(None)?;
             engine.set_color(Some([0.0, 0.0, 0.0, 1.0]))?;
             engine.draw_stretch_pic([0.0, 0.0, 320.0, 240.0], [0.0, 0.0, 1.0, 1.0], white)?;
             engine.set_color(None)?;
+            engine.set_clip_region(region)?;
             engine.draw_stretch_pic([40.0, 40.0, 100.0, 100.0], [0.0, 0.0, 1.0, 1.0], white)
         });
         let picture = picture.unwrap();
@@ -37,7 +41,9 @@ fn pictures_are_clipped_to_a_region() {
     assert_eq!(drawn(Some([0.0; 4])), [255; 6], "an empty region");
     drawn(Some(region));
     engine.start_map(ROOMS).unwrap();
-    let white = engine.register_shader_no_mip("white").unwrap();
+    let white = engine
+        .register_shader_no_mip("textures/test/white")
+        .unwrap();
     let picture = engine
         .picture_of(|engine| {
             engine.draw_stretch_pic([0.0, 0.0, 320.0, 240.0], [0.0, 0.0, 1.0, 1.0], white)
