@@ -1,8 +1,9 @@
 //! Names of folders and files in any script, and of any length.
 
-mod common;
+#[path = "common/map.rs"]
+mod map;
 
-use common::map;
+use map::map;
 use q3bsp::Format;
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
