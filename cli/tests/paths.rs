@@ -61,8 +61,12 @@ fn paths_longer_than_windows_short_ones_are_read_and_written() {
         long.push("ö".repeat(60));
     }
     assert_usable(&long);
-    // on Windows a path with the prefix `\\?\`
-    assert_usable(&long.canonicalize().unwrap());
+    if cfg!(windows) {
+        // as programs pass such paths on
+        let mut verbatim = OsString::from(r"\\?\");
+        verbatim.push(&long);
+        assert_usable(Path::new(&verbatim));
+    }
 }
 
 #[test]
