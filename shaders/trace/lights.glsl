@@ -201,27 +201,25 @@ LightSample sample_triangle(TriangleLight light, vec3 position, vec3 normal, vec
     return s;
 }
 
-// Moves the light along a line to one of its points, of which each has the same angle as seen from the position (Kulla
-// and Fajardo, Importance Sampling Techniques for Path Tracing in Participating Media, 2012). The point takes the first
-// nine bits of `u`, which keeps the others. Result: the line's mean density of points over theirs.
+// Moves the light along a line to one of 512 points, which are spaced by equal angles as seen from the position (Kulla and
+// Fajardo, Importance Sampling Techniques for Path Tracing in Participating Media, 2012). The first nine bits of `u` select
+// the point; `u` keeps the others. Returns the uniform density of points on the line over the density of the samples.
 float choose_on_line(inout SphereLight light, vec3 position, inout float u) {
     const float POINTS = 512.0;
-    float half_length = length(light.axis);
-    vec3 along = light.axis / half_length;
     vec3 to = light.origin - position;
-    float nearest = -dot(to, along);
-    float height = max(length(to + along * nearest), light.radius);
-    float low = atan(-half_length - nearest, height), high = atan(half_length - nearest, height);
+    float nearest = -dot(to, light.axis);
+    float height = max(length(to + light.axis * nearest), light.radius);
+    float low = atan(-light.half_length - nearest, height), high = atan(light.half_length - nearest, height);
     float at = u * POINTS;
     float beside = height * tan(mix(low, high, (floor(at) + 0.5) / POINTS));
     u = fract(at);
-    light.origin += along * (nearest + beside);
-    return (high - low) * (height * height + beside * beside) / (2.0 * half_length * height);
+    light.origin += light.axis * (nearest + beside);
+    return (high - low) * (height * height + beside * beside) / (2.0 * light.half_length * height);
 }
 
 LightSample sample_sphere(SphereLight light, vec3 position, vec3 normal, vec2 u) {
     LightSample s = no_light();
-    float share = light.cos_outer <= -3.0 ? choose_on_line(light, position, u.x) : 1.0;
+    float share = light.half_length > 0.0 ? choose_on_line(light, position, u.x) : 1.0;
     vec3 to = light.origin - position;
     float squared = dot(to, to);
     float d = sqrt(squared);

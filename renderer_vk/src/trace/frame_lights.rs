@@ -12,7 +12,7 @@ use shaders::types::Instance;
 use support::{Aabb, slice};
 
 use super::lights::{
-    ChangingLight, MapLights, count, half_line, number, sphere, sphere_bounds, triangle_bounds,
+    ChangingLight, MapLights, count, number, sphere, sphere_bounds, triangle_bounds,
 };
 use crate::api::DynamicLight;
 use crate::gpu::{Error, Recorder};
@@ -61,7 +61,7 @@ impl FrameLights {
 
     fn add_sphere(&mut self, light: t::SphereLight, sight: &Sight) {
         let margin = Vec3::splat(light.radius.max(SEARCH_MARGIN));
-        let line = half_line(&light);
+        let line = light.axis * light.half_length;
         let ends = Aabb::of([light.origin - line, light.origin + line]);
         let at = sight.touching(ends.grown(margin));
         let light_number = number(c::LIGHT_CHANGING_SPHERE, self.spheres.len());
@@ -279,8 +279,8 @@ pub fn dynamic_lights(lights: &[DynamicLight], scale: f32) -> Vec<t::SphereLight
             let (part, min, max) = DYNAMIC_LIGHT_SIZE;
             let radius = (light.radius * part).clamp(min, max);
             let line = (light.end.unwrap_or(light.origin) - light.origin) * 0.5;
-            let (length, is_line) = (line.length(), line.length() > 0.5);
-            let stretch = (1.0 + (length / half).powi(2)).sqrt();
+            let half_length = Some(line.length()).filter(|&length| length > 0.5);
+            let stretch = (1.0 + (line.length() / half).powi(2)).sqrt();
             let strength = (PI * half * half * scale * stretch).min(STRONGEST);
             let intensity = (color * strength).min(Vec3::splat(STRONGEST));
             let at_middle = sphere(
@@ -291,8 +291,8 @@ pub fn dynamic_lights(lights: &[DynamicLight], scale: f32) -> Vec<t::SphereLight
             );
             t::SphereLight {
                 core: light.radius * DYNAMIC_LIGHT_CORE,
-                axis: if is_line { line } else { at_middle.axis },
-                cos_outer: if is_line { -3.0 } else { at_middle.cos_outer },
+                axis: half_length.map_or(at_middle.axis, |length| line / length),
+                half_length: half_length.unwrap_or(0.0),
                 ..at_middle
             }
         })
@@ -379,7 +379,7 @@ mod tests {
             let made = dynamic_lights(&[light], 1.0).remove(0);
             let receiver = Vec3::new(length * 0.5, 50.0, 0.0);
             assert_eq!(made.origin, receiver.with_y(0.0));
-            let line = half_line(&made);
+            let line = made.axis * made.half_length;
             let intensity = made.radiance.x * PI * made.radius * made.radius;
             let parts = (0..1000).map(|i| (i as f32 + 0.5) / 500.0 - 1.0);
             let falloff = parts.map(|part| {

@@ -134,18 +134,10 @@ pub(super) fn sphere(origin: Vec3, radius: f32, intensity: Vec3, clearance: f32)
         axis: Vec3::Z,
         cos_inner: -1.0,
         cos_outer: -2.0,
+        half_length: 0.0,
         core: 0.0,
         reach: 0.0,
         end: 0.0,
-    }
-}
-
-/// From the middle of a sphere light to its end, if it is along a line.
-pub(super) fn half_line(light: &t::SphereLight) -> Vec3 {
-    if light.cos_outer <= -3.0 {
-        light.axis
-    } else {
-        Vec3::ZERO
     }
 }
 
@@ -153,7 +145,7 @@ pub(super) fn half_line(light: &t::SphereLight) -> Vec3 {
 pub(super) fn sphere_bounds(light: &t::SphereLight) -> t::LightBounds {
     t::LightBounds {
         centre: light.origin,
-        radius: light.radius + half_line(light).length(),
+        radius: light.radius + light.half_length,
         axis: if light.cos_outer > -2.0 {
             light.axis * (light.cos_outer + 2.0)
         } else {

@@ -30,12 +30,14 @@ pub struct SphereLight {
     pub radiance: Vec3,
     /// Surfaces nearer to the centre cast no shadow (the model that carries the light).
     pub clearance: f32,
-    /// Direction of a spot; of a line, from its middle to its end, units.
+    /// Direction of a spot, or of a line; of length 1.
     pub axis: Vec3,
     /// Cosine of the angle to `axis` up to which a spot has its full radiance; -1: no spot.
     pub cos_inner: f32,
-    /// Cosine of the angle to `axis` from which on a spot is dark; -2: no spot; -3: a line.
+    /// Cosine of the angle to `axis` from which on a spot is dark; -2: no spot.
     pub cos_outer: f32,
+    /// Half the length of a line, units; 0: no line.
+    pub half_length: f32,
     /// Radius of the ball of glowing gas that the sphere represents: at smaller distances the light is as at this
     /// radius. 0: none.
     pub core: f32,
