@@ -19,6 +19,12 @@ pub struct Stage {
     pub depth_func: DepthFunc,
     /// Dropped when the player turns detail textures off.
     pub detail: bool,
+    /// Dynamic lights that are evaluated per pixel are reflected by this stage (`dlight` in `.shaderx` files).
+    #[cfg_attr(
+        feature = "serde",
+        serde(default, skip_serializing_if = "std::ops::Not::not")
+    )]
+    pub dynamic_light: bool,
     /// Where the colour that multiplies the image comes from.
     pub rgb_gen: RgbGen,
     /// Where the alpha that multiplies the image's comes from.
@@ -49,6 +55,7 @@ impl Default for Stage {
             depth_write: true,
             depth_func: DepthFunc::LessEqual,
             detail: false,
+            dynamic_light: false,
             rgb_gen: RgbGen::IdentityLighting,
             alpha_gen: AlphaGen::Identity,
             tc_gen: TcGen::Base,

@@ -66,7 +66,7 @@ impl Variable {
 pub struct VariableLayout {
     /// `char *string`.
     pub string: usize,
-    /// `qboolean modified`, or a `bool`: 0 or 1, of which only the first byte is used.
+    /// `qboolean modified`, or a `bool`: 0 or 1 in the first byte; the others are not used.
     pub modified: usize,
     /// `float value`.
     pub value: usize,
@@ -128,7 +128,7 @@ pub struct FrontEnd {
     pub owned: &'static [&'static str],
     /// Endings of further files with materials, beside `.shader`.
     pub scripts: &'static [&'static CStr],
-    /// Of definitions with one name the engine takes the last that it reads, not the first.
+    /// If several script files define a name, the engine takes the definition that it reads last, not first.
     pub last_script_counts: bool,
 }
 

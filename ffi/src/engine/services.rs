@@ -10,6 +10,7 @@ use super::{
 use crate::abi::{CIN_MATERIAL, EXEC_APPEND, is_true};
 use crate::system;
 use std::ffi::{CStr, CString, c_char, c_float, c_int, c_uchar, c_void};
+use std::num::IntErrorKind;
 use std::path::PathBuf;
 use std::ptr::{self, NonNull};
 
@@ -35,15 +36,20 @@ fn in_c_pieces(text: &str, mut f: impl FnMut(*const c_char)) {
     }
 }
 
-/// The number at the start of the text, as C's `atoi` reads it; 0 if there is none.
-fn whole_number(text: &str) -> c_int {
+/// The number at the start of the text, as C's `atoi` reads it: 0 if there is none, `None` if it is out of range, for
+/// which C defines no result.
+fn whole_number(text: &str) -> Option<c_int> {
     let text = text.trim_start();
     let is_part =
         |(at, c): &(usize, char)| c.is_ascii_digit() || *at == 0 && matches!(c, '+' | '-');
     let end = text.char_indices().take_while(is_part).count();
-    text.get(..end)
-        .and_then(|digits| digits.parse().ok())
-        .unwrap_or(0)
+    match text.get(..end).unwrap_or_default().parse() {
+        Ok(number) => Some(number),
+        Err(error) => match error.kind() {
+            IntErrorKind::PosOverflow | IntErrorKind::NegOverflow => None,
+            _ => Some(0),
+        },
+    }
 }
 
 /// A service that is missing in the engine's table does nothing and returns an empty value.
@@ -187,8 +193,9 @@ impl Engine {
                 return false;
             }
             if byte == [0] {
-                return whole_number(&String::from_utf8_lossy(&text))
-                    == c_int::from_ne_bytes(number);
+                let number = c_int::from_ne_bytes(number);
+                let text = String::from_utf8_lossy(&text);
+                return whole_number(&text).is_none_or(|expected| expected == number);
             }
             text.extend(byte);
         }

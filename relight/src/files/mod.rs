@@ -92,7 +92,8 @@ pub trait GameFiles {
     /// folder below `dir`, as the engine does.
     fn list(&self, dir: &str, extension: &str) -> Vec<String>;
 
-    /// Value of a console variable of the engine that these files are of; empty if there is none.
+    /// Value of a console variable of the engine that reads these files, which scripts may compare; empty if there is
+    /// no engine or no such variable.
     fn variable(&self, _name: &str) -> String {
         String::new()
     }

@@ -8,8 +8,13 @@ use super::material::NO_DYNAMIC_LIGHT;
 
 /// Index of the stage in the material's stages; `None` for a material that reflects no such light.
 pub(super) fn light_stage(shader: &Shader, sort: f32) -> Option<usize> {
-    let dark = shader.sky.is_some() || shader.surface_flags & NO_DYNAMIC_LIGHT != 0;
-    if dark || sort == sort::SKY || sort >= sort::FOG {
+    if sort == sort::SKY || sort >= sort::FOG {
+        return None;
+    }
+    if let Some(stated) = shader.stages.iter().position(|stage| stage.dynamic_light) {
+        return Some(stated);
+    }
+    if shader.sky.is_some() || shader.surface_flags & NO_DYNAMIC_LIGHT != 0 {
         return None;
     }
     let mut chosen: Option<(usize, &Stage)> = None;
@@ -122,6 +127,16 @@ mod tests {
             chosen("{ map a.tga\nalphaFunc GE128\ndepthWrite }\n{ map b.tga\nblendFunc add }"),
             Some(0)
         );
+    }
+
+    #[test]
+    fn a_script_may_name_the_stage() {
+        let script =
+            b"a { surfaceparm nodlight\n{ map a.tga\ndlight }\n{ map b.tga\nblendFunc blend } }";
+        let parsed = shaderscript::parse_script("a.shaderx", script);
+        let shader = parsed.shaders.first().unwrap();
+        assert_eq!(light_stage(shader, sort::OPAQUE), Some(0));
+        assert_eq!(light_stage(shader, sort::BLEND), None);
     }
 
     #[test]

@@ -8,11 +8,11 @@ use shaders::types::constants as c;
 use shaders::types::{Draw, Instance, Vertex};
 
 use super::depth_first;
-use super::groups::fog_state;
+use super::groups::{fog_state, light_state, pixel_light_source};
 use super::list::{Call, DepthRange, DrawList, faces, sky_state, stage_depth};
 use super::overlay::overlay_instance;
 use super::passes;
-use super::pipelines::{CullFaces, Depth, State};
+use super::pipelines::{CullFaces, State};
 use super::shading::{Shading, StageContext};
 use crate::assets::compile::sampler;
 use crate::assets::{LightmapClass, Material, RasterPass};
@@ -65,7 +65,9 @@ impl DrawList {
                 surfaces(&stages, material, world, &mut found);
             }
         }
-        lights(&stages, &mut found);
+        if stages.pixel_lights.is_none() {
+            spots(&stages, &mut found);
+        }
     }
 }
 
@@ -113,6 +115,22 @@ fn surfaces(
             }
         }
     }
+    let reflecting = material
+        .light_stage
+        .filter(|_| material.lightmap_class == LightmapClass::Page);
+    if let (Some(stage), Some(_)) = (reflecting, stages.pixel_lights) {
+        let instance = expected_instance();
+        let (shading, draw) =
+            stages.pixel_light(material, stage, &instance, lightmap, Draw::default());
+        let plain = State {
+            offset: material.polygon_offset,
+            ..State::plain(faces(material.shader.cull, false))
+        };
+        found(
+            light_state(plain, pixel_light_source(material), shading),
+            draw,
+        );
+    }
     for pass in material.passes.iter().filter(|_| flat) {
         if let Some((state, draw)) = drawn(std::slice::from_ref(pass)) {
             let state = State {
@@ -142,18 +160,12 @@ fn sky(stages: &StageContext<'_>, material: &Material, mut found: impl FnMut(Sta
     }
 }
 
-/// Calls `found` with each draw of dynamic lights on walls.
-fn lights(stages: &StageContext<'_>, mut found: impl FnMut(State, Draw)) {
+/// Calls `found` with each draw of the spots of dynamic lights on walls.
+fn spots(stages: &StageContext<'_>, mut found: impl FnMut(State, Draw)) {
     let (shading, draw) = stages.light(Draw::default());
+    let plain = State::plain(CullFaces::CounterClockwise);
     for source in [c::BLEND_DST_COLOR, c::BLEND_ONE] {
-        let state = State {
-            blend: Some((source, c::BLEND_ONE)),
-            depth: Depth::Equal,
-            depth_write: false,
-            shading,
-            ..State::plain(CullFaces::CounterClockwise)
-        };
-        found(state, draw);
+        found(light_state(plain, source, shading), draw);
     }
 }
 

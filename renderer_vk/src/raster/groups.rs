@@ -121,6 +121,26 @@ pub(super) fn fog_state(plain: State, opaque: bool, shading: Shading) -> State {
     }
 }
 
+/// State of a dynamic light over the draws of `plain`. `source`: source factor of its blending.
+pub(super) fn light_state(plain: State, source: u32, shading: Shading) -> State {
+    State {
+        blend: Some((source, c::BLEND_ONE)),
+        depth: Depth::Equal,
+        depth_write: false,
+        shading,
+        ..plain
+    }
+}
+
+/// Source factor of a light that is evaluated per pixel.
+pub(super) fn pixel_light_source(material: &Material) -> u32 {
+    if material.sort < sort::OPAQUE {
+        c::BLEND_DST_COLOR
+    } else {
+        c::BLEND_ONE
+    }
+}
+
 fn plain_draw(group: &Group) -> Draw {
     Draw {
         instance: group.common.instance,
@@ -348,17 +368,10 @@ impl DrawList {
                 None => context.stages.light(draw),
             };
             let source = match pixel_stage {
-                Some(_) if material.sort < sort::OPAQUE => c::BLEND_DST_COLOR,
-                Some(_) => c::BLEND_ONE,
+                Some(_) => pixel_light_source(material),
                 None => light_source_factor(light),
             };
-            let state = State {
-                blend: Some((source, c::BLEND_ONE)),
-                depth: Depth::Equal,
-                depth_write: false,
-                shading,
-                ..context.plain_state(material)
-            };
+            let state = light_state(context.plain_state(material), source, shading);
             let call = self.call(state, group.range, span, draw);
             match pixel_stage {
                 Some(_) => self.pixel_lights.push(call),

@@ -525,7 +525,10 @@ impl<'a> Gatherer<'a> {
             let key = sort_key(rank, number, mesh.fog, false);
             let model = entity.is_some_and(|entity| entity.kind == EntityKind::Model);
             let lights = if self.lights_models() && model {
-                u32::MAX // the draw list keeps the triangles that each light reaches
+                // one bit for each light; the draw list keeps the triangles that the light reaches
+                u32::MAX
+                    .checked_shr(32u32.saturating_sub(count(self.lights.len())))
+                    .unwrap_or(0)
             } else {
                 0
             };

@@ -27,6 +27,7 @@ struct Draft {
     depth_write_forced: bool,
     depth_func: DepthFunc,
     detail: bool,
+    dynamic_light: bool,
     rgb_gen: Option<RgbGen>,
     alpha_gen: AlphaGen,
     tc_gen: Option<TcGen>,
@@ -55,6 +56,7 @@ impl DefinitionParser<'_, '_, '_> {
             depth_write_forced: false,
             depth_func: DepthFunc::LessEqual,
             detail: false,
+            dynamic_light: false,
             rgb_gen: None,
             alpha_gen: AlphaGen::Identity,
             tc_gen: None,
@@ -128,8 +130,9 @@ impl DefinitionParser<'_, '_, '_> {
                 draft.depth_write = true;
                 draft.depth_write_forced = true;
             }
-            // of fragments that the engine's own dynamic lights and depth passes draw
-            "depthfragment" | "dlight" if self.extended => {}
+            "dlight" if self.extended => draft.dynamic_light = true,
+            // only the engine's own depth pass uses it
+            "depthfragment" if self.extended => {}
             _ => return Err(Rejection(format!("unknown stage keyword '{}'", token.text))),
         }
         Ok(())
@@ -384,6 +387,7 @@ impl DefinitionParser<'_, '_, '_> {
             depth_write: draft.depth_write || overwrites,
             depth_func: draft.depth_func,
             detail: draft.detail,
+            dynamic_light: draft.dynamic_light,
             rgb_gen,
             alpha_gen: draft.alpha_gen,
             tc_gen: draft.tc_gen.unwrap_or(if draft.lightmap_named {
