@@ -131,7 +131,7 @@ pub fn add(handle: usize, look_up: LookUp, profile: Option<&'static Profile>) {
     chains.push((key, chain));
 }
 
-/// The chain of what is to be destroyed.
+/// Removes the chain of an instance or a device that is being destroyed, and returns it.
 pub fn remove(handle: usize) -> Option<Arc<Chain>> {
     let key = key(handle);
     let mut chains = CHAINS.write().unwrap_or_else(PoisonError::into_inner);

@@ -140,7 +140,7 @@ pub unsafe extern "system" fn device(
     }
     // SAFETY: this is its type.
     let create: vk::PFN_vkCreateDevice = unsafe { chain.next(Call::vkCreateDevice) };
-    // SAFETY: the caller's arguments, of which the queues may be ours.
+    // SAFETY: the caller's arguments; the list of queues may be this layer's, which outlives the call.
     let result = unsafe { create(physical, &info, allocator, device) };
     if result == vk::Result::SUCCESS {
         // SAFETY: the call succeeded, so it has written the handle.

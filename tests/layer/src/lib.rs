@@ -28,7 +28,7 @@ use ash::vk;
 use calls::CALLS;
 use hooks::HOOKS;
 
-/// What a layer tells the loader: the third version of `VkNegotiateLayerInterface`.
+/// `VkNegotiateLayerInterface`, by which the loader and a layer exchange their entry points.
 #[repr(C)]
 pub struct Negotiation {
     kind: u32,
