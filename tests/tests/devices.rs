@@ -13,8 +13,11 @@ use tests::layer::{Outcome, Session};
 
 /// The program that plays a session.
 const PROGRAM: &str = env!("CARGO_BIN_EXE_session");
-/// Sessions at a time: most of one waits for the compiler of shaders, which uses one core.
-const AT_ONCE: usize = 2;
+/// Sessions at a time, by the cores: most of one waits for the compiler of shaders, which uses one core.
+fn at_once() -> usize {
+    let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
+    cores.max(2)
+}
 
 /// Whether there is a Vulkan device; otherwise the test is reported as skipped.
 fn available() -> bool {
@@ -29,7 +32,7 @@ fn play(session: &Session) -> Outcome {
 fn play_all(sessions: &[Session], look: impl Fn(&Session, &Outcome) -> Option<String> + Sync) {
     let (next, wrong) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     std::thread::scope(|scope| {
-        for _ in 0..AT_ONCE {
+        for _ in 0..at_once() {
             scope.spawn(|| {
                 while let Some(session) = sessions.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let outcome = play(session);

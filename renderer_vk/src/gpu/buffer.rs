@@ -156,6 +156,13 @@ impl Buffer {
         let (object, offset) = (unsafe { memory.memory() }, memory.offset());
         // SAFETY: the memory was allocated for these requirements and is bound once.
         let bound = unsafe { vk.bind_buffer_memory(raw, object, offset) };
+        if let Err(e) = bound.context("vkBindBufferMemory") {
+            // Not by the graveyard: staging buffers are made while the uploads are locked, which it locks too.
+            // SAFETY: nothing uses the new buffer.
+            unsafe { vk.destroy_buffer(raw, None) };
+            device.0.free(memory);
+            return Err(e);
+        }
         let mut inner = BufferInner {
             device: device.clone(),
             raw,
@@ -165,7 +172,6 @@ impl Buffer {
             address: 0,
             name: desc.name.to_owned(),
         };
-        bound.context("vkBindBufferMemory")?;
         let info = vk::BufferDeviceAddressInfo::default().buffer(raw);
         // SAFETY: the buffer is bound and was made with the address usage.
         inner.address = unsafe { vk.get_buffer_device_address(&info) };

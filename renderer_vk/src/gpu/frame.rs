@@ -206,7 +206,7 @@ impl FrameRing {
         if submitted.is_ok() {
             lock(&device.0.state).submitted = value;
         }
-        device.0.put_back(pending);
+        device.0.put_back(pending, submitted.is_ok());
         if submitted.is_ok()
             && let Some(place) = ring_slot.and_then(|i| self.slots.get_mut(i))
         {

@@ -351,34 +351,42 @@ impl Device {
         let slot = recorder.slot;
         slot.finish(true)?;
         let mut pending = std::mem::take(&mut *lock(&self.0.pending));
-        let done = slot
+        let submitted = slot
             .record_before(&mut pending)
-            .and_then(|()| self.submit_and_wait(&[slot.before, slot.main]));
-        self.0.put_back(pending);
-        done?;
+            .and_then(|()| self.submit(&[slot.before, slot.main]));
+        self.0.put_back(pending, submitted.is_ok());
+        self.wait_for(submitted?)?;
         Ok(value)
     }
 
-    fn submit_and_wait(&self, buffers: &[vk::CommandBuffer]) -> Result<(), Error> {
+    /// Submits recorded buffers; the returned fence is signalled when the device has executed them.
+    fn submit(&self, buffers: &[vk::CommandBuffer]) -> Result<vk::Fence, Error> {
         let vk = self.vk();
         // SAFETY: plain creation.
         let fence = unsafe { vk.create_fence(&vk::FenceCreateInfo::default(), None) }
             .context("vkCreateFence")?;
         let submits = [vk::SubmitInfo::default().command_buffers(buffers)];
-        let submitted = {
-            let queue = lock(&self.0.queue);
-            // SAFETY: the buffers are recorded and pending nowhere else; the queue is held.
-            unsafe { vk.queue_submit(*queue, &submits, fence) }.context("vkQueueSubmit")
-        };
-        let done = submitted.and_then(|()| {
-            // SAFETY: the fence was submitted.
-            let waited = unsafe { vk.wait_for_fences(&[fence], true, u64::MAX) };
-            // The device may still execute the buffers, which the caller drops.
-            waited
-                .context("vkWaitForFences")
-                .or_else(|e| self.wait().and(Err(e)))
-        });
-        // SAFETY: the submission failed, or its execution is over, or the device is lost.
+        let queue = lock(&self.0.queue);
+        // SAFETY: the buffers are recorded and pending nowhere else; the queue is held.
+        let submitted = unsafe { vk.queue_submit(*queue, &submits, fence) };
+        if submitted.is_err() {
+            // SAFETY: the submission failed, so nothing uses the fence.
+            unsafe { vk.destroy_fence(fence, None) };
+        }
+        submitted.context("vkQueueSubmit")?;
+        Ok(fence)
+    }
+
+    /// Waits for a submission and destroys its fence.
+    fn wait_for(&self, fence: vk::Fence) -> Result<(), Error> {
+        let vk = self.vk();
+        // SAFETY: the fence was submitted.
+        let waited = unsafe { vk.wait_for_fences(&[fence], true, u64::MAX) };
+        // The device may still execute the buffers, which the caller drops.
+        let done = waited
+            .context("vkWaitForFences")
+            .or_else(|e| self.wait().and(Err(e)));
+        // SAFETY: the execution is over, or the device is lost.
         unsafe { vk.destroy_fence(fence, None) };
         done
     }

@@ -94,6 +94,19 @@ impl Pending {
         self.inits.is_empty() && self.copies.is_empty()
     }
 
+    /// Adds uploads that were requested later.
+    fn append(&mut self, mut later: Self) {
+        self.inits.append(&mut later.inits);
+        self.targets.extend(later.targets);
+        self.copies.append(&mut later.copies);
+        if !later.staging.is_empty() {
+            self.used = later.used;
+        }
+        self.staging.append(&mut later.staging);
+        self.spare.append(&mut later.spare);
+        self.staged += later.staged;
+    }
+
     /// Removes all staging buffers, used and spare.
     pub fn take_staging(&mut self) -> impl Iterator<Item = (vk::Buffer, Allocation)> {
         self.staging.drain(..).chain(self.spare.drain(..))
@@ -292,23 +305,21 @@ pub(crate) fn record(device: &Device, cmd: vk::CommandBuffer, pending: &mut Pend
 }
 
 impl DeviceInner {
-    /// Takes back a recorded list, for its memory: its staging buffers are buried.
-    pub fn put_back(&self, mut recorded: Pending) {
-        for (buffer, memory) in recorded.staging.drain(..) {
-            self.bury(Garbage::Staging(buffer, memory));
+    /// Takes back a recorded list. After its submission only its memory is of use, and its staging buffers are buried;
+    /// if the submission failed, its uploads wait for the next one: they belong to objects that stay.
+    pub fn put_back(&self, mut recorded: Pending, submitted: bool) {
+        if submitted {
+            for (buffer, memory) in recorded.staging.drain(..) {
+                self.bury(Garbage::Staging(buffer, memory));
+            }
+            recorded.inits.clear();
+            recorded.targets.clear();
+            recorded.copies.clear();
+            (recorded.used, recorded.staged) = (0, 0);
         }
-        recorded.inits.clear();
-        recorded.targets.clear();
-        recorded.copies.clear();
-        (recorded.used, recorded.staged) = (0, 0);
         let mut pending = lock(&self.pending);
-        // keeps uploads requested meanwhile
-        if pending.is_empty() && pending.staging.is_empty() {
-            recorded.spare.append(&mut pending.spare);
-            *pending = recorded;
-        } else {
-            pending.spare.append(&mut recorded.spare);
-        }
+        recorded.append(std::mem::take(&mut pending));
+        *pending = recorded;
     }
 }
 
@@ -454,5 +465,46 @@ impl Device {
             self.immediate(|_| Ok(()))?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn uploads_whose_submission_failed_come_before_later_ones() {
+        let copy = |size| Copy::Buffer {
+            source: vk::Buffer::null(),
+            target: vk::Buffer::null(),
+            region: vk::BufferCopy::default().size(size),
+        };
+        let size = |copy: &Copy| match copy {
+            Copy::Buffer { region, .. } => region.size,
+            Copy::Image { .. } => 0,
+        };
+        let target = |raw| Target {
+            image: vk::Handle::from_raw(raw),
+            layout: vk::ImageLayout::GENERAL,
+            aspect: vk::ImageAspectFlags::COLOR,
+        };
+        let mut failed = Pending {
+            inits: vec![target(1)],
+            copies: vec![copy(1), copy(2)],
+            used: 48,
+            staged: 40,
+            ..Pending::default()
+        };
+        failed.append(Pending {
+            inits: vec![target(2)],
+            copies: vec![copy(3)],
+            staged: 2,
+            ..Pending::default()
+        });
+        assert_eq!(failed.copies.iter().map(size).collect::<Vec<_>>(), [1, 2, 3]);
+        let images: Vec<_> = failed.inits.iter().map(|target| target.image).collect();
+        assert_eq!(images, [target(1).image, target(2).image]);
+        // Without a staging buffer of the later ones, the next upload goes behind the earlier ones.
+        assert_eq!((failed.used, failed.staged), (48, 42));
     }
 }
