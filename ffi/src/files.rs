@@ -2,7 +2,7 @@
 
 use crate::engine::{Engine, valid_game_path};
 use crate::session;
-use relight::{FileError, GameFiles};
+use relight::{FileError, GameFiles, Precedence};
 use std::ffi::CString;
 
 /// Game files as the engine finds them: in its packs and folders, by its download rules.
@@ -61,10 +61,6 @@ impl GameFiles for EngineFiles {
                     names.extend(self.engine.list_files(&dir, more));
                 }
                 names.extend(self.engine.list_files(&dir, &extension));
-                // definitions in later files replace those in earlier ones
-                if front.is_some_and(|front| front.last_script_counts) {
-                    names.reverse();
-                }
                 names
             }
             _ => Vec::new(),
@@ -78,6 +74,11 @@ impl GameFiles for EngineFiles {
             _ if session::on_main_thread() => self.engine.cvar_text_if_any(name),
             _ => String::new(),
         }
+    }
+
+    fn precedence(&self) -> Precedence {
+        let front = self.engine.front_end();
+        front.map_or(Precedence::default(), |front| front.precedence)
     }
 
     fn exists(&self, path: &str) -> bool {

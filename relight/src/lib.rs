@@ -55,7 +55,7 @@ pub use emitters::{
     CalibrationReport, LightLists, LightReport, PointLight, SunLight, TriangleLight,
 };
 pub use external_lightmaps::external_lightmaps;
-pub use files::{FileError, GameFiles, MemoryFiles, Overlay, Pak, Pk3, SearchPath};
+pub use files::{FileError, GameFiles, MemoryFiles, Overlay, Pak, Pk3, Precedence, SearchPath};
 pub use load::{LoadError, Options, Progress, Stage};
 pub use map_files::map_files;
 pub use materials::{Materials, Resolved};

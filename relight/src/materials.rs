@@ -67,9 +67,9 @@ impl Materials {
                 }),
             }
         }
-        let mut materials = Materials::from_library(Library::with_variables(scripts, &|name| {
-            files.variable(name)
-        }));
+        let variables = |name: &str| files.variable(name);
+        let library = Library::of_engine(scripts, &variables, files.precedence());
+        let mut materials = Materials::from_library(library);
         materials.unusable.extend_from_slice(&unreadable);
         unreadable.extend_from_slice(materials.library.diagnostics());
         (materials, unreadable)

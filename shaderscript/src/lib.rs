@@ -29,7 +29,7 @@ pub use glam;
 pub use collapse::{Combine, Pass, collapse, collapse_vertex_light};
 pub use diagnostic::{Diagnostic, Severity};
 pub use implicit::ImplicitKind;
-pub use library::{Library, strip_extension};
+pub use library::{Library, Precedence, strip_extension};
 pub use parse::{Script, Variables, parse_script};
 pub use shader::{
     Cull, Deform, Fog, LightDirectives, Location, Shader, Sky, Sun, UnknownDirective, sort,

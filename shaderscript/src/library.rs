@@ -7,9 +7,19 @@ use crate::{
 };
 use std::collections::HashMap;
 
+/// The definition that counts where the joined scripts have several of one name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Precedence {
+    /// The first: id's engine and most others.
+    #[default]
+    First,
+    /// The last: Quake3e.
+    Last,
+}
+
 /// The scripts of a game.
 ///
-/// Precedence: the engine joins the files in *reverse* listing order and takes the first definition of a name. The
+/// Precedence: id's engine joins the files in *reverse* listing order and takes the first definition of a name. The
 /// listing has the highest-priority archive first, so between files of different names the one from the
 /// lowest-priority archive wins, and inside one file the first definition. Files of the same name never meet: the
 /// file system shows only the one of highest priority. A file that fails the structural check contributes nothing.
@@ -27,16 +37,22 @@ impl Library {
     pub fn new<N: AsRef<str>, T: AsRef<[u8]>>(
         files: impl IntoIterator<Item = (N, T), IntoIter: DoubleEndedIterator>,
     ) -> Library {
-        Self::with_variables(files, &|_| String::new())
+        Self::of_engine(files, &|_| String::new(), Precedence::First)
     }
 
-    /// [`Library::new`] with console variables, which conditions in `.shaderx` files compare.
-    pub fn with_variables<N: AsRef<str>, T: AsRef<[u8]>>(
+    /// [`Library::new`] with console variables, which conditions in `.shaderx` files compare, and an engine's choice
+    /// among definitions of one name.
+    pub fn of_engine<N: AsRef<str>, T: AsRef<[u8]>>(
         files: impl IntoIterator<Item = (N, T), IntoIter: DoubleEndedIterator>,
         variables: Variables<'_>,
+        precedence: Precedence,
     ) -> Library {
         let mut library = Library::default();
-        for (file, text) in files.into_iter().rev() {
+        let mut files: Vec<(N, T)> = files.into_iter().collect();
+        if precedence == Precedence::First {
+            files.reverse();
+        }
+        for (file, text) in files {
             let script = parse_with(file.as_ref(), text.as_ref(), variables);
             if script.dropped.is_some() {
                 // what the file is dropped for is found before anything else
@@ -46,7 +62,11 @@ impl Library {
             if script.dropped.is_some() {
                 continue;
             }
-            for shader in script.shaders {
+            let mut shaders = script.shaders;
+            if precedence == Precedence::Last {
+                shaders.reverse();
+            }
+            for shader in shaders {
                 let index = library.shaders.len();
                 let key = shader.name.to_ascii_lowercase();
                 match library
@@ -61,7 +81,7 @@ impl Library {
                         severity: Severity::Note,
                         shader: Some(shader.name.clone()),
                         message: format!(
-                            "not used: {}:{} defines this name first",
+                            "not used: {}:{} defines this name too, and counts",
                             winner.location.file, winner.location.line
                         ),
                     }),
@@ -82,8 +102,7 @@ impl Library {
         self.by_name.get(&key).and_then(|&i| self.shaders.get(i))
     }
 
-    /// Every definition, in the order in which the engine would come across them; of several with one name the
-    /// first counts.
+    /// Every definition; of several with one name the first in this list counts.
     pub fn definitions(&self) -> &[Shader] {
         &self.shaders
     }
@@ -155,6 +174,20 @@ mod tests {
         assert_eq!(library.definitions().len(), 3);
         assert_eq!(library.effective().count(), 1);
         assert_eq!(library.diagnostics().len(), 2);
+    }
+
+    #[test]
+    fn where_the_last_definition_counts_the_first_file_listed_wins() {
+        let two = |name: &str| {
+            format!("a\n{{\n{{\nmap {name}1\n}}\n}}\nA\n{{\n{{\nmap {name}2\n}}\n}}\n")
+        };
+        let files = [("high.shader", two("high")), ("low.shader", two("low"))];
+        let library = Library::of_engine(files, &|_| String::new(), Precedence::Last);
+        assert_eq!(images(&library, "a"), ["high2"]);
+        assert_eq!(
+            (library.definitions().len(), library.effective().count()),
+            (4, 1)
+        );
     }
 
     #[test]

@@ -10,6 +10,7 @@ mod services;
 
 use crate::abi::functions as f;
 use crate::abi::{QBool, glconfig_t};
+use relight::Precedence;
 use std::borrow::Cow;
 use std::cell::UnsafeCell;
 use std::ffi::{CStr, CString, c_char, c_void};
@@ -128,8 +129,8 @@ pub struct FrontEnd {
     pub owned: &'static [&'static str],
     /// Endings of further files with materials, beside `.shader`.
     pub scripts: &'static [&'static CStr],
-    /// If several script files define a name, the engine takes the definition that it reads last, not first.
-    pub last_script_counts: bool,
+    /// The definition that the engine takes among several of one name.
+    pub precedence: Precedence,
 }
 
 /// Functions of an engine that makes the window itself.

@@ -11,6 +11,7 @@ use crate::engine::{self, Engine, FrontEnd, Table, renderer_made_window, variabl
 use crate::{cvars, system};
 use abi::{cvar_t, refexport_t, refimport_t};
 use exports::EXPORTS;
+use relight::Precedence;
 use std::ffi::c_void;
 use std::ptr;
 
@@ -32,7 +33,7 @@ pub(crate) static FRONT_END: FrontEnd = FrontEnd {
     defaults: &[],
     owned: &[],
     scripts: &[],
-    last_script_counts: false,
+    precedence: Precedence::First,
 };
 
 unsafe fn install(imports: *const c_void) -> Engine {

@@ -7,6 +7,7 @@ use crate::engine::{self, Engine, FrontEnd, Table, renderer_made_window, variabl
 use crate::exports::exports;
 use crate::{lifecycle, scene};
 use abi::{cvar_t, refexport_t, refimport_t};
+use relight::Precedence;
 use std::ffi::{c_int, c_void};
 use std::ptr;
 
@@ -34,7 +35,7 @@ pub(crate) static FRONT_END: FrontEnd = FrontEnd {
     ],
     owned: &[],
     scripts: &[],
-    last_script_counts: false,
+    precedence: Precedence::First,
 };
 
 /// Result of every `GetRefAPI`; the engine copies it.

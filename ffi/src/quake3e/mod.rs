@@ -13,6 +13,7 @@ use crate::engine::{
 };
 use abi::{CV_FLOAT, CV_INTEGER, cvar_t, refexport_t, refimport_t};
 use exports::EXPORTS;
+use relight::Precedence;
 use std::cell::UnsafeCell;
 use std::ffi::{c_char, c_float, c_long, c_void};
 use std::io::Write;
@@ -61,7 +62,7 @@ pub(crate) static FRONT_END: FrontEnd = FrontEnd {
         "r_swapInterval",
     ],
     scripts: &[c".shaderx"],
-    last_script_counts: true,
+    precedence: Precedence::Last,
 };
 
 /// The engine's table, for the services with other types than ioquake3's.

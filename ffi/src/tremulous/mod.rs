@@ -8,6 +8,7 @@ use crate::exports::exports;
 use crate::session::with_renderer;
 use crate::{lifecycle, scene};
 use abi::{cvar_t, glconfig_t, refexport_t, refimport_t};
+use relight::Precedence;
 use std::ffi::{c_float, c_void};
 use std::mem::MaybeUninit;
 use std::ptr;
@@ -30,7 +31,7 @@ pub(crate) static FRONT_END: FrontEnd = FrontEnd {
     defaults: &[("r_mode", "-2"), ("r_znear", "1")],
     owned: &[],
     scripts: &[],
-    last_script_counts: false,
+    precedence: Precedence::First,
 };
 
 /// Result of every `GetRefAPI`; the engine copies it.

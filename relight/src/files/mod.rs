@@ -17,6 +17,7 @@ pub use overlay::Overlay;
 pub use pak::Pak;
 pub use pk3::Pk3;
 pub use search_path::{SearchPath, compare_pack_names};
+pub use shaderscript::Precedence;
 
 use std::io;
 
@@ -98,6 +99,11 @@ pub trait GameFiles {
         String::new()
     }
 
+    /// The definition that counts among several of one name in the scripts of these files.
+    fn precedence(&self) -> Precedence {
+        Precedence::default()
+    }
+
     /// Whether [`read`](Self::read) would find the file.
     fn exists(&self, path: &str) -> bool {
         matches!(self.read(path), Ok(Some(_)))
@@ -115,6 +121,10 @@ impl<T: GameFiles + ?Sized> GameFiles for &T {
 
     fn variable(&self, name: &str) -> String {
         (**self).variable(name)
+    }
+
+    fn precedence(&self) -> Precedence {
+        (**self).precedence()
     }
 
     fn exists(&self, path: &str) -> bool {

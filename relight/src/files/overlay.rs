@@ -1,6 +1,6 @@
 //! Files in memory over other files.
 
-use super::{FileError, GameFiles, MemoryFiles};
+use super::{FileError, GameFiles, MemoryFiles, Precedence};
 
 /// A few files over a game's: what is in front hides what is behind.
 #[derive(Debug)]
@@ -31,6 +31,10 @@ impl<B: GameFiles> GameFiles for Overlay<B> {
 
     fn variable(&self, name: &str) -> String {
         self.back.variable(name)
+    }
+
+    fn precedence(&self) -> Precedence {
+        self.back.precedence()
     }
 
     fn exists(&self, path: &str) -> bool {

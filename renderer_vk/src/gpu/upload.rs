@@ -501,7 +501,10 @@ mod tests {
             staged: 2,
             ..Pending::default()
         });
-        assert_eq!(failed.copies.iter().map(size).collect::<Vec<_>>(), [1, 2, 3]);
+        assert_eq!(
+            failed.copies.iter().map(size).collect::<Vec<_>>(),
+            [1, 2, 3]
+        );
         let images: Vec<_> = failed.inits.iter().map(|target| target.image).collect();
         assert_eq!(images, [target(1).image, target(2).image]);
         // Without a staging buffer of the later ones, the next upload goes behind the earlier ones.
