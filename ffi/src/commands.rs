@@ -4,14 +4,17 @@ use crate::boundary::entry;
 use crate::capture::{Format, Shot, StillShot, still_arguments};
 use crate::costs::Report;
 use crate::cvars::Cvar;
-use crate::delivery::take_captures_of_last_frame;
+use crate::delivery::{set_variables, take_captures_of_last_frame};
 use crate::engine::{self, Engine, valid_path_to_write};
 use crate::failure::Failure;
+use crate::presets::{self, Trial};
 use crate::session::{self, Front, with_renderer};
 use crate::window;
 use crate::window::modes::MODES;
 use renderer_vk::Renderer;
+use renderer_vk::settings::Preset;
 use std::ffi::{CStr, CString};
+use std::time::Instant;
 
 /// A command, as the engine calls it.
 ///
@@ -42,6 +45,7 @@ static COMMANDS: &[(&CStr, Function)] = &[
     (c"rt_stats", stats),
     (c"rt_screenshot", still),
     (c"rt_path", path),
+    (c"rt_preset", preset),
 ];
 
 /// Adds all commands.
@@ -183,6 +187,53 @@ unsafe extern "C" fn lights() {
         ));
         lines
     });
+}
+
+unsafe extern "C" fn preset() {
+    entry(|| {
+        let Some(engine) = engine::current() else {
+            return Ok(());
+        };
+        let arguments = engine.arguments();
+        let name = arguments.get(1).map(String::as_str);
+        let (chosen, lines) = with_renderer(|renderer, front| {
+            front.trial = None;
+            Ok(match (name, name.and_then(Preset::of)) {
+                (_, Some(preset)) => (Some(preset), vec![format!("rt_preset {}", preset.name)]),
+                (Some(auto), None) if auto.eq_ignore_ascii_case("auto") => {
+                    begin_trial(renderer, front)
+                }
+                _ => (None, presets::lines(&front.settings)),
+            })
+        })?;
+        if let Some(preset) = chosen {
+            set_variables(engine, preset.values());
+        }
+        for line in lines {
+            engine.say(&format!("{line}\n"));
+        }
+        Ok(())
+    });
+}
+
+/// Begins `rt_preset auto`; the preset to begin with, and lines for the console.
+fn begin_trial(renderer: &Renderer, front: &mut Front) -> (Option<&'static Preset>, Vec<String>) {
+    if !front.settings.rt || renderer.world().is_none() {
+        let line = "rt_preset auto measures the traced look: set r_rt 1 and start a map first";
+        return (None, vec![line.into()]);
+    }
+    let refresh = window::current().map_or(0, |window| window.refresh_rate());
+    let software = renderer.device_info().software;
+    let (trial, first) = Trial::new(refresh, software, Instant::now());
+    let line = match trial {
+        Some(_) => format!(
+            "rt_preset auto: measuring, beginning with {}; keep playing",
+            first.name
+        ),
+        None => format!("rt_preset {}: this device draws in software", first.name),
+    };
+    front.trial = trial;
+    (Some(first), vec![line])
 }
 
 unsafe extern "C" fn path() {

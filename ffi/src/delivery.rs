@@ -2,7 +2,7 @@
 //! after the renderer's state is back in its cell.
 
 use crate::capture::{self, Format, Shot, VideoFrame};
-use crate::cvars::Cvar;
+use crate::cvars::{Cvar, c_text};
 use crate::engine::Engine;
 use crate::failure::Failure;
 use crate::session::{Front, with_renderer};
@@ -19,6 +19,8 @@ pub struct Outbox {
     pub video: Option<(*mut u8, c_int)>,
     /// Lines for the console, without line ends.
     pub lines: Vec<String>,
+    /// Console variables to set, and their values.
+    pub variables: Vec<(&'static str, &'static str)>,
     /// Time of the game for the frame, milliseconds.
     pub front_end_ms: c_int,
     /// Time of the renderer for ending the frame, milliseconds.
@@ -110,12 +112,23 @@ pub fn deliver(engine: Engine, outbox: Outbox) {
             engine.say(&format!("Wrote {path}\n"));
         }
     }
+    set_variables(engine, outbox.variables);
     for line in outbox.lines {
         engine.say(&format!("{line}\n"));
     }
     if let Some((data, length)) = outbox.video {
         // SAFETY: `keep_video` just filled the engine's buffer with `length` bytes.
         unsafe { engine.write_avi_frame(data, length) };
+    }
+}
+
+/// Sets console variables.
+pub fn set_variables(
+    engine: Engine,
+    values: impl IntoIterator<Item = (&'static str, &'static str)>,
+) {
+    for (name, value) in values {
+        engine.cvar_set(&c_text(name), value);
     }
 }
 

@@ -52,6 +52,7 @@ mod lifecycle;
 mod load;
 mod logging;
 pub mod openarena;
+mod presets;
 pub mod quake3e;
 mod queries;
 mod recognize;

@@ -10,6 +10,7 @@ use crate::engine::{self, Engine, valid_game_path};
 use crate::failure::Failure;
 use crate::files::EngineFiles;
 use crate::glconfig;
+use crate::presets::Step;
 use crate::session::{self, Front, with_renderer};
 use crate::window::{self, Window};
 use renderer_vk::{Eye, Renderer, RendererOptions};
@@ -250,6 +251,7 @@ pub fn end(ending: Ending) {
     commands::remove(engine);
     let destroyed = session::with(|session| {
         session.front.registered = false;
+        session.front.trial = None;
         session.front.clip_region = None;
         session.front.captures.clear();
         session.front.cinematics.clear();
@@ -384,6 +386,7 @@ fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Fa
         .lines
         .extend(crate::speeds::lines(&front.settings, &stats, renderer));
     finish_still(renderer, front, &mut outbox)?;
+    go_on_with_trial(renderer, front, &mut outbox);
     let answers = (front.questions).answer(renderer, &front.settings, Instant::now());
     outbox.lines.extend(answers.lines);
     let files = answers.files.into_iter();
@@ -391,6 +394,29 @@ fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Fa
         .files
         .extend(files.map(|(path, bytes)| (path, bytes, false)));
     Ok(outbox)
+}
+
+/// `rt_preset auto`: measures the frame, and changes the settings after enough of them.
+fn go_on_with_trial(renderer: &Renderer, front: &mut Front, outbox: &mut Outbox) {
+    let Some(trial) = &mut front.trial else {
+        return;
+    };
+    match trial.frame(Instant::now(), renderer.costs().traced_ms()) {
+        Step::Measures => {}
+        Step::Try(preset, ms) => {
+            outbox.variables.extend(preset.values());
+            let line = format!("a frame takes {ms:.1} ms; trying {}", preset.name);
+            outbox.lines.push(line);
+        }
+        Step::Ends(preset, ms) => {
+            outbox.variables.extend(preset.values());
+            let cost = ms.map_or_else(String::new, |ms| format!("; a frame takes {ms:.1} ms"));
+            outbox
+                .lines
+                .push(format!("rt_preset {}{cost}", preset.name));
+            front.trial = None;
+        }
+    }
 }
 
 /// Drops an accumulated picture at the end of the game; returns a message for the player.

@@ -10,6 +10,7 @@ use crate::cinematics::Cinematics;
 use crate::costs::Questions;
 use crate::cvars::Cvars;
 use crate::failure::Failure;
+use crate::presets::Trial;
 use crate::window;
 use renderer_vk::{Renderer, Settings};
 use std::cell::{Cell, UnsafeCell};
@@ -40,6 +41,8 @@ pub struct Front {
     pub captures: Captures,
     /// Requests of `rt_stats` and `rt_printPerfStats`.
     pub questions: Questions,
+    /// `rt_preset auto`, while it measures.
+    pub trial: Option<Trial>,
     /// The camera path being recorded by `rt_path`: its file and its lines.
     pub path: Option<(String, String)>,
     /// Videos of materials.

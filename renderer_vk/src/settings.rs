@@ -3,6 +3,7 @@
 //! the command line.
 
 mod choices;
+mod presets;
 mod row;
 mod value;
 
@@ -12,6 +13,7 @@ pub use choices::{
     Anaglyph, DebugOutput, DenoiserChoice, LightSelection, MapLightChoice, ModelShadows,
     TextureMode, TracerChoice,
 };
+pub use presets::{PRESETS, Preset};
 use row::written_back;
 pub use row::{Accumulation, Kind, Range, Reading, Row, SettingError, Spec, flags, kept};
 pub use value::Given;

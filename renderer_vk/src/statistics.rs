@@ -89,6 +89,9 @@ impl MemoryPurpose {
     }
 }
 
+/// How names of passes of a traced view begin.
+const TRACED: &str = "trace_";
+
 /// Costs of the newest finished frame, and memory in use.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Costs {
@@ -173,12 +176,18 @@ impl Costs {
         lines
     }
 
+    /// GPU milliseconds of the frame, if it showed a traced view.
+    pub fn traced_ms(&self) -> Option<f32> {
+        let traced = self.passes.iter().any(|pass| pass.name.starts_with(TRACED));
+        traced.then(|| self.total().ms)
+    }
+
     /// One line: time, the traced passes, rays, memory.
     pub fn summary(&self) -> String {
         let total = self.total();
         let mut line = format!("{:.2} ms", total.ms);
         for pass in &self.passes {
-            if let Some(name) = pass.name.strip_prefix("trace_") {
+            if let Some(name) = pass.name.strip_prefix(TRACED) {
                 let _ = write!(line, ", {name} {:.2}", pass.ms);
             }
         }

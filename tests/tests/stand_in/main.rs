@@ -7,6 +7,7 @@ mod captures;
 mod game;
 mod odd_engines;
 mod pictures;
+mod player;
 mod quake3e;
 mod session;
 mod support;
