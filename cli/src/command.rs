@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::{Parser, Subcommand};
 
 use crate::outcome::parse;
-use crate::{calibration, cameras, compare, convert, info, lights, material, render};
+use crate::{calibration, cameras, compare, convert, info, lights, material, render, report};
 
 /// Maps of id Tech 3 games: contents, conversion, pictures with new light
 #[derive(Parser, Debug)]
@@ -27,6 +27,7 @@ enum Command {
     Lights(lights::LightsArgs),
     Material(material::MaterialArgs),
     Render(Box<render::RenderArgs>),
+    Report(report::ReportArgs),
 }
 
 /// Names of earlier versions: subcommand, option (empty for the subcommand itself), replacement.
@@ -60,6 +61,7 @@ pub fn run() -> Result<ExitCode> {
         Command::Lights(args) => lights::run(&args),
         Command::Material(args) => return material::run(&args),
         Command::Render(args) => render::run(&args),
+        Command::Report(args) => report::run(&args),
     }?;
     Ok(ExitCode::SUCCESS)
 }

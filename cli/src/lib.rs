@@ -24,6 +24,7 @@ mod numbers;
 mod outcome;
 mod pictures;
 mod render;
+mod report;
 mod scripts;
 mod settings;
 mod table;

@@ -1,21 +1,36 @@
 //! Prints warnings of the libraries to standard error.
 
 use std::collections::HashSet;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{LazyLock, Mutex, PoisonError};
 
 use log::{LevelFilter, Log, Metadata, Record};
 
 /// Prints each warning once, one a line: several views of a map load the same files again.
 #[derive(Default)]
 struct Messages {
-    printed: Mutex<HashSet<String>>,
+    printed: Mutex<Printed>,
 }
+
+/// The messages so far.
+#[derive(Default)]
+struct Printed {
+    known: HashSet<String>,
+    /// In the order in which they were printed.
+    lines: Vec<String>,
+}
+
+/// The logger of the process.
+static MESSAGES: LazyLock<Messages> = LazyLock::new(Messages::default);
 
 impl Messages {
     /// Whether a message was not printed before.
     fn is_new(&self, message: &str) -> bool {
         let mut printed = self.printed.lock().unwrap_or_else(PoisonError::into_inner);
-        !printed.contains(message) && printed.insert(message.to_owned())
+        let new = !printed.known.contains(message) && printed.known.insert(message.to_owned());
+        if new {
+            printed.lines.push(message.to_owned());
+        }
+        new
     }
 }
 
@@ -36,9 +51,18 @@ impl Log for Messages {
 
 /// Starts to print warnings.
 pub fn print_warnings() {
-    if log::set_boxed_logger(Box::<Messages>::default()).is_ok() {
+    if log::set_logger(&*MESSAGES).is_ok() {
         log::set_max_level(LevelFilter::Warn);
     }
+}
+
+/// The warnings that were printed, oldest first.
+pub fn printed() -> Vec<String> {
+    let printed = MESSAGES
+        .printed
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner);
+    printed.lines.clone()
 }
 
 #[cfg(test)]

@@ -46,6 +46,7 @@ static COMMANDS: &[(&CStr, Function)] = &[
     (c"rt_screenshot", still),
     (c"rt_path", path),
     (c"rt_preset", preset),
+    (c"report", report),
 ];
 
 /// Adds all commands.
@@ -234,6 +235,36 @@ fn begin_trial(renderer: &Renderer, front: &mut Front) -> (Option<&'static Prese
     };
     front.trial = trial;
     (Some(first), vec![line])
+}
+
+unsafe extern "C" fn report() {
+    entry(|| {
+        let Some(engine) = engine::current() else {
+            return Ok(());
+        };
+        let taken = |path: &String| {
+            CString::new(path.as_str()).is_ok_and(|path| engine.home_file_exists(&path))
+        };
+        let paths = (0..10_000).map(|number| format!("reports/relight{number:04}.zip"));
+        let Some(path) = { paths }.find(|path| !taken(path)) else {
+            engine.say("report: all 10000 file names are taken\n");
+            return Ok(());
+        };
+        let zip = with_renderer(|renderer, front| {
+            crate::reports::zip(engine, renderer, front).map(Some)
+        })?;
+        engine.say(&match zip {
+            Some(Ok(bytes)) if engine.write_file(&path, &bytes) => {
+                format!(
+                    "Wrote {path}: send this file with your question; nothing personal is in it\n"
+                )
+            }
+            Some(Ok(_)) => format!("{path} could not be written\n"),
+            Some(Err(e)) => format!("{e}\n"),
+            None => "report: the renderer is not running\n".to_owned(),
+        });
+        Ok(())
+    });
 }
 
 unsafe extern "C" fn path() {

@@ -56,6 +56,7 @@ mod presets;
 pub mod quake3e;
 mod queries;
 mod recognize;
+mod reports;
 mod scene;
 mod session;
 mod speeds;

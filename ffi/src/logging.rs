@@ -6,12 +6,18 @@
 use crate::engine::print;
 use crate::{engine, session};
 use log::{Level, LevelFilter, Log, Metadata, Record};
+use std::collections::VecDeque;
 use std::ffi::c_int;
 use std::panic;
 use std::sync::{Mutex, Once, PoisonError};
 
 struct EngineLog;
 
+/// How many records a report has.
+const KEPT: usize = 2000;
+
+/// The newest records, oldest first, for reports.
+static NEWEST: Mutex<VecDeque<String>> = Mutex::new(VecDeque::new());
 /// Records of other threads, and the position of the last panic.
 static WAITING: Mutex<Vec<(c_int, String)>> = Mutex::new(Vec::new());
 static PANIC_PLACE: Mutex<Option<String>> = Mutex::new(None);
@@ -47,6 +53,7 @@ impl Log for EngineLog {
         }
         let level = level_of(record.level());
         let line = line_of(record.level(), &record.args().to_string());
+        keep(&line);
         if session::on_main_thread() {
             if let Some(engine) = engine::current() {
                 engine.print(level, &line);
@@ -60,6 +67,21 @@ impl Log for EngineLog {
     }
 
     fn flush(&self) {}
+}
+
+/// Keeps a record for reports.
+fn keep(line: &str) {
+    let mut newest = NEWEST.lock().unwrap_or_else(PoisonError::into_inner);
+    if newest.len() == KEPT {
+        newest.pop_front();
+    }
+    newest.push_back(line.to_owned());
+}
+
+/// The newest records, oldest first.
+pub fn newest() -> Vec<String> {
+    let newest = NEWEST.lock().unwrap_or_else(PoisonError::into_inner);
+    newest.iter().cloned().collect()
 }
 
 /// Starts passing records to the engine. May be called at every `GetRefAPI`.

@@ -15,6 +15,7 @@ mod half;
 pub mod path;
 mod raster;
 mod renderer;
+pub mod report;
 mod scene;
 pub mod settings;
 mod statistics;

@@ -8,6 +8,7 @@ mod table;
 pub use settings::{apply, apply_at_registration, write_back_limits};
 pub use table::Cvar;
 
+use std::collections::HashMap;
 use std::ffi::{CString, c_int};
 
 use crate::engine::{Engine, Variable, cvar_flags};
@@ -127,6 +128,12 @@ impl Cvars {
             own,
             settings,
         }
+    }
+
+    /// The texts of the settings' variables, by name.
+    pub fn texts(&self) -> HashMap<&'static str, String> {
+        let text = |r: &Registered| Some((r.row.spec.name, self.engine.cvar_string(r.variable?)));
+        self.settings.iter().filter_map(text).collect()
     }
 
     fn handle(&self, cvar: Cvar) -> Option<Variable> {

@@ -1,10 +1,13 @@
-//! What players ask for in the console: presets.
+//! What players ask for in the console: presets, reports.
 
-use super::support::{engine_in_map, for_every_engine, text_of};
+use super::support::{engine_in_map, for_every_engine, image_of, text_of};
 use tests::engine::{Engine, View};
 use tests::maps::HERE;
 
-for_every_engine!(presets_set_what_decides_about_cost,);
+for_every_engine!(
+    presets_set_what_decides_about_cost,
+    a_report_has_what_developers_ask_for_and_nothing_personal,
+);
 
 /// Runs a command and draws a frame; what was printed.
 fn ask(engine: &mut Engine, command: &str) -> String {
@@ -47,5 +50,68 @@ fn the_preset_of_a_software_device_is_the_cheapest() {
     } else {
         assert!(printed.contains("measuring"), "{printed}");
     }
+    engine.assert_clean();
+}
+
+fn a_report_has_what_developers_ask_for_and_nothing_personal() {
+    let mut engine = engine_in_map();
+    engine.set("rt_bounces", "2");
+    let shown = engine.picture(&View::new(HERE, 30.0)).unwrap();
+    engine.take_messages();
+    for number in 0..2 {
+        engine.command("report").unwrap();
+        let path = format!("reports/relight000{number}.zip");
+        let printed = text_of(&engine.take_messages());
+        assert!(printed.contains(&format!("Wrote {path}")), "{printed}");
+    }
+    let bytes = engine.read_file("reports/relight0001.zip").unwrap();
+    let mut zip = zip::ZipArchive::new(std::io::Cursor::new(bytes)).unwrap();
+    let mut file = |name: &str| {
+        let mut bytes = Vec::new();
+        let mut file = zip.by_name(name).unwrap();
+        std::io::Read::read_to_end(&mut file, &mut bytes).unwrap();
+        bytes
+    };
+    let mut text = |name: &str| String::from_utf8(file(name)).unwrap();
+    let texts = [
+        "about.txt",
+        "device.txt",
+        "settings.txt",
+        "timings.json",
+        "log.txt",
+    ]
+    .map(&mut text);
+    let [about, device, settings, timings, log] = &texts;
+    assert!(about.contains("map: maps/rooms.bsp"), "{about}");
+    assert!(device.contains("driver"), "{device}");
+    assert!(
+        settings.contains("* rt_bounces \"2\" (default \"1\")"),
+        "{settings}"
+    );
+    assert!(serde_json::from_str::<serde_json::Value>(timings).unwrap()["passes"].is_array());
+    assert!(log.contains("Relight on"), "{log}");
+    let home = engine.home().display().to_string();
+    for text in &texts {
+        for word in std::env::var("HOME")
+            .into_iter()
+            .filter(|home| home.len() > 1)
+        {
+            assert!(!text.contains(&word), "{word} in {text}");
+        }
+        assert!(!text.contains(&home), "{home} in {text}");
+    }
+    let picture = image_of(&file("picture.png"), "png");
+    let alike = relight::compare::compare(&shown, &picture).unwrap();
+    assert!(alike.ssim > 0.9999, "{alike:?}");
+
+    // Where the engine cannot write.
+    std::fs::remove_dir_all(engine.home().join("reports")).unwrap();
+    std::fs::write(engine.home().join("reports"), b"no folder").unwrap();
+    engine.command("report").unwrap();
+    let printed = text_of(&engine.take_messages());
+    assert!(
+        printed.contains("reports/relight0000.zip could not be written"),
+        "{printed}"
+    );
     engine.assert_clean();
 }
