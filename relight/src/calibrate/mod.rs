@@ -26,8 +26,8 @@
 //!    [`RelitWorld::point_lights`](crate::RelitWorld::point_lights) and rebuilds the light lists.
 //! 8. `styles` repeats the fit for each light style, which the compiler stored separately.
 //!
-//! `docs/calibration.md` has the equations and the measured errors. [`residuals()`] compares any world's light with
-//! its stored light.
+//! `docs/src/how/calibration.md` explains the equations, `lab/notes/calibration.md` has the measured errors.
+//! [`residuals()`] compares any world's light with its stored light.
 //!
 //! A result depends on the world and the options alone, on no clock and no thread count, so it can be cached
 //! ([`CalibrationCache`]).
