@@ -55,7 +55,7 @@ fn assignment(text: &str) -> Result<Assignment, String> {
 // Settings of the renderer.
 #[derive(Args, Debug)]
 pub struct SettingArgs {
-    /// Set a setting by its console name (docs/settings.md), for example --set rt_maxDepth=2; may be repeated
+    /// Set a setting by its console name (docs/src/settings), for example --set rt_maxDepth=2; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<Assignment>,
 }

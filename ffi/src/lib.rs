@@ -24,7 +24,7 @@
 //! [`abi`] holds the structures that all engines share, `engine` the services of any engine as methods over one internal
 //! table. A front end ([`ioq3`], [`openarena`], [`quake3e`], [`tremulous`]) is one folder: the engine's tables, a function that fills the
 //! internal table, the table of exports, and a row of what is particular to the engine. The other modules name no engine;
-//! `front_ends` lists the front ends. `docs/port-to-your-engine.md` explains how to add one.
+//! `front_ends` lists the front ends. `docs/src/port.md` explains how to add one.
 
 pub mod abi;
 mod boundary;

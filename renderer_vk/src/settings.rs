@@ -1,5 +1,5 @@
 //! The renderer's settings. A setting is a row of the table below, from which macros generate the field of [`Settings`]
-//! and its default, the console variable of a front end, the key of accumulation, `docs/settings.md`, and the values of
+//! and its default, the console variable of a front end, the key of accumulation, `docs/src/settings`, and the values of
 //! the command line.
 
 mod choices;

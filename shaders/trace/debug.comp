@@ -1,5 +1,5 @@
 #version 460
-// `rt_debug`: an intermediate result in place of the picture. `docs/settings.md` explains the colours.
+// `rt_debug`: an intermediate result in place of the picture. `docs/src/settings/views.md` explains the colours.
 #include "trace/lights.glsl"
 #include "trace/denoise.glsl"
 #include "trace/camera.glsl"

@@ -327,7 +327,7 @@ fn a_display_that_is_lost_ends_the_game() {
     assert!(status.code().is_some(), "it crashed: {status}");
 }
 
-/// The table of docs/devices.md.
+/// The table of docs/src/devices.md.
 fn table() -> String {
     let mut rows = String::from("| file | device | missing | refused |\n|---|---|---|---|\n");
     for name in profiles() {
@@ -356,7 +356,7 @@ const RAY_TRACING: &str = "`KHR_acceleration_structure`, `KHR_deferred_host_oper
 
 #[test]
 fn the_page_has_the_table() {
-    let path = data::repository().join("docs/devices.md");
+    let path = data::repository().join("docs/src/devices.md");
     let page = std::fs::read_to_string(&path).expect("the page");
     let (begin, end) = ("<!-- devices -->\n", "<!-- /devices -->");
     let (before, rest) = page.split_once(begin).expect("the beginning of the table");

@@ -1,6 +1,5 @@
-//! The tables of variables in `docs/settings.md`. `RELIGHT_UPDATE=1 cargo test -p ffi cvars::document` writes them.
+//! The tables of variables in `docs/src/settings`. `RELIGHT_UPDATE=1 cargo test -p ffi cvars::document` writes them.
 
-use std::fmt::Write;
 use std::path::Path;
 
 use super::tests::{KNOWN, specs};
@@ -32,43 +31,57 @@ fn line(spec: &Spec) -> String {
     )
 }
 
-/// The page with the table below a heading replaced.
-fn with_table(page: &str, heading: &str, rows: &[&Spec]) -> String {
-    let (before, after) = page.split_once(heading).expect(heading);
-    let (text, table) = after.split_once("|---|---|---|---|\n").expect("a table");
-    let rest = table.split_once("\n\n").expect("text after the table").1;
-    let mut page = format!("{before}{heading}{text}|---|---|---|---|\n");
-    for spec in rows {
-        write!(page, "{}", line(spec)).expect("memory");
-    }
-    page + "\n" + rest
-}
+/// A table: the page that holds it, its name in the comments around it, its rows.
+type Table = (&'static str, &'static str, Vec<&'static Spec>);
 
-#[test]
-fn the_page_has_the_tables() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/settings.md");
-    let page = std::fs::read_to_string(&path).expect("docs/settings.md");
-    let unused: Vec<_> = UNUSED.iter().collect();
+fn tables() -> [Table; 4] {
     let is_known = |spec: &&Spec| {
         let mut names = KNOWN.lines().filter_map(|line| line.split(' ').next());
         names.any(|name| name == spec.name)
     };
-    let used = specs().filter(|spec| !unused.iter().any(|u| u.name == spec.name));
+    let is_traced = |spec: &&Spec| spec.name == "r_rt" || spec.name.starts_with("rt_");
+    let used = specs().filter(|spec| !UNUSED.iter().any(|u| u.name == spec.name));
     let (known, ours): (Vec<_>, Vec<_>) = used.partition(is_known);
-    let tables = [
-        ("## Settings of the engine\n", known),
-        ("## Settings without effect\n", unused),
-        ("## Settings of this renderer\n", ours),
-    ];
-    let written = tables.iter().fold(page.clone(), |page, (heading, rows)| {
-        with_table(&page, heading, rows)
-    });
-    if std::env::var_os("RELIGHT_UPDATE").is_some() {
-        std::fs::write(&path, written).expect("docs/settings.md");
-    } else {
-        assert!(
-            written == page,
-            "docs/settings.md: run with RELIGHT_UPDATE=1"
-        );
+    let (traced, others): (Vec<_>, Vec<_>) = ours.into_iter().partition(is_traced);
+    [
+        ("engine.md", "engine", known),
+        ("engine.md", "without effect", UNUSED.iter().collect()),
+        ("renderer.md", "traced look", traced),
+        ("renderer.md", "device and classic look", others),
+    ]
+}
+
+/// The page with the table between two comments replaced.
+fn with_table(page: &str, name: &str, rows: &[&Spec]) -> String {
+    let begin = format!("<!-- settings: {name} -->\n");
+    let end = format!("<!-- /settings: {name} -->");
+    let (before, rest) = page.split_once(&begin).expect("the beginning of the table");
+    let (_, after) = rest.split_once(&end).expect("the end of the table");
+    let rows: String = rows.iter().map(|spec| line(spec)).collect();
+    let head = "| name | default | flags | what it does |\n|---|---|---|---|\n";
+    format!("{before}{begin}\n{head}{rows}\n{end}{after}")
+}
+
+#[test]
+fn the_pages_have_the_tables() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/src/settings");
+    let tables = tables();
+    for name in ["engine.md", "renderer.md"] {
+        let path = folder.join(name);
+        let page = std::fs::read_to_string(&path).expect(name);
+        let written = tables
+            .iter()
+            .filter(|(holder, ..)| *holder == name)
+            .fold(page.clone(), |page, (_, table, rows)| {
+                with_table(&page, table, rows)
+            });
+        if std::env::var_os("RELIGHT_UPDATE").is_some() {
+            std::fs::write(&path, written).expect(name);
+        } else {
+            assert!(
+                written == page,
+                "docs/src/settings/{name}: run with RELIGHT_UPDATE=1"
+            );
+        }
     }
 }
