@@ -21,7 +21,7 @@ pub struct CompareArgs {
     reference: PathBuf,
     /// Pictures to compare with it; folders with pictures of the same names, if the reference is a folder
     others: Vec<PathBuf>,
-    /// Write all pictures side by side to this file (PNG)
+    /// Write all pictures side by side to this file (PNG or JPEG, by its ending)
     #[arg(long, value_name = "FILE")]
     side_by_side: Option<PathBuf>,
     /// For folders: write the least similar pictures to this folder, with the reference and the difference

@@ -9,7 +9,7 @@ use relight::calibrate::{Residual, residuals};
 use relight::light::EmissionSource;
 use relight::{CalibrationOptions, RelitWorld};
 
-use crate::pictures::{write_png, write_whole};
+use crate::pictures::{write_rgb, write_whole};
 
 /// Longest side of the picture, pixels.
 const SIDE: f32 = 1400.0;
@@ -57,7 +57,7 @@ pub fn draw(world: &RelitWorld, paths: &[PathBuf]) -> Result<()> {
         } else {
             let (width, height) = (size.x as u32, size.y as u32);
             let pixels = raster(&shapes, width as usize, height as usize);
-            write_png(path, &pixels, width, height)?;
+            write_rgb(path, &pixels, width, height)?;
         }
     }
     Ok(())

@@ -1,21 +1,21 @@
-//! Prints warnings of the libraries to standard error.
+//! Prints warnings of the libraries to standard error, and keeps them and other messages for reports.
 
 use std::collections::HashSet;
 use std::sync::{LazyLock, Mutex, PoisonError};
 
-use log::{LevelFilter, Log, Metadata, Record};
+use log::{Level, LevelFilter, Log, Metadata, Record};
 
-/// Prints each warning once, one a line: several views of a map load the same files again.
+/// Keeps each message once and prints the warnings, one a line: several views of a map load the same files again.
 #[derive(Default)]
 struct Messages {
-    printed: Mutex<Printed>,
+    kept: Mutex<Kept>,
 }
 
 /// The messages so far.
 #[derive(Default)]
-struct Printed {
+struct Kept {
     known: HashSet<String>,
-    /// In the order in which they were printed.
+    /// Oldest first.
     lines: Vec<String>,
 }
 
@@ -23,12 +23,12 @@ struct Printed {
 static MESSAGES: LazyLock<Messages> = LazyLock::new(Messages::default);
 
 impl Messages {
-    /// Whether a message was not printed before.
+    /// Whether a message is new.
     fn is_new(&self, message: &str) -> bool {
-        let mut printed = self.printed.lock().unwrap_or_else(PoisonError::into_inner);
-        let new = !printed.known.contains(message) && printed.known.insert(message.to_owned());
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let new = !kept.known.contains(message) && kept.known.insert(message.to_owned());
         if new {
-            printed.lines.push(message.to_owned());
+            kept.lines.push(message.to_owned());
         }
         new
     }
@@ -36,12 +36,13 @@ impl Messages {
 
 impl Log for Messages {
     fn enabled(&self, metadata: &Metadata<'_>) -> bool {
-        metadata.level() <= log::Level::Warn
+        metadata.level() <= Level::Info
     }
 
     fn log(&self, record: &Record<'_>) {
         let message = record.args().to_string();
-        if self.enabled(record.metadata()) && self.is_new(&message) {
+        let new = self.enabled(record.metadata()) && self.is_new(&message);
+        if new && record.level() <= Level::Warn {
             eprintln!("{message}");
         }
     }
@@ -52,17 +53,14 @@ impl Log for Messages {
 /// Starts to print warnings.
 pub fn print_warnings() {
     if log::set_logger(&*MESSAGES).is_ok() {
-        log::set_max_level(LevelFilter::Warn);
+        log::set_max_level(LevelFilter::Info);
     }
 }
 
-/// The warnings that were printed, oldest first.
-pub fn printed() -> Vec<String> {
-    let printed = MESSAGES
-        .printed
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner);
-    printed.lines.clone()
+/// The messages so far, oldest first.
+pub fn kept() -> Vec<String> {
+    let kept = MESSAGES.kept.lock().unwrap_or_else(PoisonError::into_inner);
+    kept.lines.clone()
 }
 
 #[cfg(test)]
@@ -70,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_message_is_printed_once() {
+    fn a_message_is_kept_once() {
         let messages = Messages::default();
         assert!(messages.is_new("a.shader:1: no such directive"));
         assert!(messages.is_new("a.shader:2: no such directive"));

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use image::ImageEncoder;
 use relight::compare::Rgb8;
 
@@ -22,14 +22,44 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
         .with_context(|| format!("{}: cannot be written", path.display()))
 }
 
-/// Writes a PNG of 8 bits a channel, rows from the top.
+/// Quality of JPEG files, percent.
+const JPEG_QUALITY: u8 = 85;
+
+/// Whether a path ends in `.jpg` or `.jpeg`.
+fn is_jpeg(path: &Path) -> bool {
+    let extension = path.extension().unwrap_or_default();
+    ["jpg", "jpeg"]
+        .iter()
+        .any(|jpeg| extension.eq_ignore_ascii_case(jpeg))
+}
+
+/// Fails if [`write_rgb`] does not write files of this name.
+///
+/// # Errors
+/// Says which it writes.
+pub fn check_name(path: &Path) -> Result<()> {
+    let png = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("png"));
+    if !png && !is_jpeg(path) {
+        bail!("{}: pictures are .png or .jpg", path.display());
+    }
+    Ok(())
+}
+
+/// Writes a picture of 8 bits a channel, rows from the top: a JPEG if the path ends so, otherwise a PNG.
 ///
 /// # Errors
 /// The file cannot be written, or `rgb` does not have three bytes a pixel.
-pub fn write_png(path: &Path, rgb: &[u8], width: u32, height: u32) -> Result<()> {
+pub fn write_rgb(path: &Path, rgb: &[u8], width: u32, height: u32) -> Result<()> {
     let mut bytes = Vec::new();
-    let encoder = image::codecs::png::PngEncoder::new(&mut bytes);
-    encoder.write_image(rgb, width, height, image::ExtendedColorType::Rgb8)?;
+    let kind = image::ExtendedColorType::Rgb8;
+    if is_jpeg(path) {
+        image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY)
+            .write_image(rgb, width, height, kind)?;
+    } else {
+        image::codecs::png::PngEncoder::new(&mut bytes).write_image(rgb, width, height, kind)?;
+    }
     write_whole(path, &bytes)
 }
 
@@ -55,7 +85,7 @@ pub fn read(path: &Path) -> Result<Rgb8> {
     )?)
 }
 
-/// Writes a picture as PNG.
+/// Writes a picture, as [`write_rgb`] does.
 ///
 /// # Errors
 /// The file cannot be written, or the picture is too large.
@@ -64,5 +94,5 @@ pub fn write(path: &Path, picture: &Rgb8) -> Result<()> {
         u32::try_from(picture.width())?,
         u32::try_from(picture.height())?,
     );
-    write_png(path, picture.pixels(), width, height)
+    write_rgb(path, picture.pixels(), width, height)
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::game::Game;
 use crate::numbers;
-use crate::pictures::write_png;
+use crate::pictures::{check_name, write_rgb};
 use crate::settings::{Assignment, SettingArgs, default, help, value_of};
 use crate::timings::Timings;
 use crate::view::{Camera, load, open};
@@ -55,7 +55,7 @@ pub struct RenderArgs {
     sample: bool,
     #[command(flatten)]
     game: Game,
-    /// Output file (PNG)
+    /// Output file (PNG, or JPEG by the ending .jpg)
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// Look of the picture; default: traced, and classic with --overview
@@ -335,20 +335,15 @@ impl RenderArgs {
     fn numbered(&self, number: usize) -> PathBuf {
         // a path that ends in `..` has no name; writing to it fails
         let stem = self.output.file_stem().unwrap_or_default();
-        let name = format!("{}_{number:04}.png", stem.to_string_lossy());
+        let extension = self.output.extension().unwrap_or_default();
+        let name = format!("{}_{number:04}.{}", stem.display(), extension.display());
         self.output.with_file_name(name)
     }
 }
 
 /// Runs the command.
 pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
-    let png = args
-        .output
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("png"));
-    if !png {
-        bail!("{}: pictures are .png", args.output.display());
-    }
+    check_name(&args.output)?;
     if args.frames.is_some() && args.path.is_none() {
         bail!(
             "--frames is the number of pictures of a --path; --spp is the number of frames drawn for one picture"
@@ -398,7 +393,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         timings.add(&renderer.timings(), &stats);
         if let Some(path) = written {
             let picture = renderer.read_pixels()?;
-            write_png(path, &picture.rgb, picture.width, picture.height)?;
+            write_rgb(path, &picture.rgb, picture.width, picture.height)?;
             if json {
                 eprintln!("{}", path.display());
             } else {

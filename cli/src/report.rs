@@ -98,7 +98,7 @@ pub fn run(args: &ReportArgs) -> Result<()> {
         device: renderer.device_info(),
         costs: &renderer.costs(),
         settings: [("r_rt", "1".to_owned()), ("r_picmip", "0".to_owned())].into(),
-        log: &messages::printed(),
+        log: &messages::kept(),
         pictures: &pictures,
     };
     write_whole(&args.output, &report.zip()?)?;

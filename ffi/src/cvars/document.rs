@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::tests::{KNOWN, specs};
 use super::{UNUSED, flags};
-use renderer_vk::settings::{Kind, Spec};
+use renderer_vk::settings::{Kind, PRESETS, Preset, Spec};
 
 /// A row of a table. The help of variables without effect ends with a sentence that their table states once.
 fn line(spec: &Spec) -> String {
@@ -62,26 +62,62 @@ fn with_table(page: &str, name: &str, rows: &[&Spec]) -> String {
     format!("{before}{begin}\n{head}{rows}\n{end}{after}")
 }
 
+/// The page with the table of presets replaced.
+fn with_presets(page: &str) -> String {
+    let (begin, end) = ("<!-- presets -->\n", "<!-- /presets -->");
+    let (before, rest) = page.split_once(begin).expect("the beginning of the table");
+    let (_, after) = rest.split_once(end).expect("the end of the table");
+    let row = |name: String, of: &dyn Fn(&Preset) -> String| {
+        let cells: Vec<String> = PRESETS.iter().map(of).collect();
+        format!("| {name} | {} |\n", cells.join(" | "))
+    };
+    let value = |preset: &Preset, name: &str| {
+        let mut values = preset.values();
+        let found = values.find(|(other, _)| *other == name);
+        found.map_or_else(String::new, |(_, value)| format!("`{value}`"))
+    };
+    let mut table = row("setting".to_owned(), &|preset| format!("`{}`", preset.name));
+    table += &row("---".to_owned(), &|_| "---".to_owned());
+    for (name, _) in PRESETS.iter().take(1).flat_map(Preset::values) {
+        table += &row(format!("`{name}`"), &|preset| value(preset, name));
+    }
+    table += &row("what it is for".to_owned(), &|preset| {
+        preset.help.to_owned()
+    });
+    format!("{before}{begin}\n{table}\n{end}{after}")
+}
+
+/// Compares a page with what it should be, or writes it.
+fn check_page(name: &str, written: impl FnOnce(&str) -> String) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../docs/src")
+        .join(name);
+    let page = std::fs::read_to_string(&path).expect(name);
+    let written = written(&page);
+    if std::env::var_os("RELIGHT_UPDATE").is_some() {
+        std::fs::write(&path, written).expect(name);
+    } else {
+        assert!(
+            written == page,
+            "docs/src/{name}: run with RELIGHT_UPDATE=1"
+        );
+    }
+}
+
+#[test]
+fn the_page_of_presets_has_their_table() {
+    check_page("play/presets.md", with_presets);
+}
+
 #[test]
 fn the_pages_have_the_tables() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/src/settings");
     let tables = tables();
     for name in ["engine.md", "renderer.md"] {
-        let path = folder.join(name);
-        let page = std::fs::read_to_string(&path).expect(name);
-        let written = tables
-            .iter()
-            .filter(|(holder, ..)| *holder == name)
-            .fold(page.clone(), |page, (_, table, rows)| {
+        let of_page = tables.iter().filter(|(holder, ..)| *holder == name);
+        check_page(&format!("settings/{name}"), |page| {
+            of_page.fold(page.to_owned(), |page, (_, table, rows)| {
                 with_table(&page, table, rows)
-            });
-        if std::env::var_os("RELIGHT_UPDATE").is_some() {
-            std::fs::write(&path, written).expect(name);
-        } else {
-            assert!(
-                written == page,
-                "docs/src/settings/{name}: run with RELIGHT_UPDATE=1"
-            );
-        }
+            })
+        });
     }
 }

@@ -18,7 +18,7 @@ pub struct Preset {
 pub static PRESETS: &[Preset] = &[
     Preset {
         name: "low",
-        help: "for graphics chips without ray tracing: half the width and height, no bounces",
+        help: "half the width and height and no bounces, for graphics chips without ray tracing",
         column: 0,
     },
     Preset {
