@@ -33,7 +33,7 @@ pub struct ReportArgs {
     #[command(flatten)]
     game: Game,
     /// The file
-    #[arg(long, short, value_name = "FILE", default_value = "relight-report.zip")]
+    #[arg(short, long, value_name = "PATH", default_value = "relight-report.zip")]
     output: PathBuf,
     /// Vulkan device: part of its name
     #[arg(long, value_name = "NAME")]

@@ -35,6 +35,7 @@ fn help_lists_the_commands_of_users_and_those_of_the_lab_apart() {
         "lights",
         "material",
         "render",
+        "report",
         "help",
     ];
     assert_eq!(listed(RELIGHT), users);
