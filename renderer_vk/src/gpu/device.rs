@@ -230,9 +230,7 @@ impl Device {
 
     /// Waits for all submitted work.
     pub(crate) fn wait(&self) -> Result<(), Error> {
-        let _queue = lock(&self.0.queue);
-        // SAFETY: the queue is held, so nothing is submitted meanwhile.
-        unsafe { self.0.core.raw.device_wait_idle() }.context("vkDeviceWaitIdle")
+        self.0.idle()
     }
 
     /// The driver's pipeline cache, for [`DeviceOptions::pipeline_cache`] of a later run.
@@ -336,6 +334,19 @@ impl std::fmt::Debug for Device {
 }
 
 impl DeviceInner {
+    /// Waits for all submitted work. A wait that fails for want of memory has not waited, and what the caller destroys
+    /// next may be in use: the only queue is then waited for by another call.
+    fn idle(&self) -> Result<(), Error> {
+        let queue = lock(&self.queue);
+        // SAFETY: the queue is held, so nothing is submitted meanwhile.
+        match unsafe { self.core.raw.device_wait_idle() } {
+            Ok(()) => Ok(()),
+            Err(vk::Result::ERROR_DEVICE_LOST) => Err(Error::DeviceLost("vkDeviceWaitIdle")),
+            // SAFETY: as above.
+            Err(_) => unsafe { self.core.raw.queue_wait_idle(*queue) }.context("vkQueueWaitIdle"),
+        }
+    }
+
     /// Makes objects that need the device; on an error, dropping `self` destroys those already made.
     fn init(&mut self, options: &DeviceOptions) -> Result<(), Error> {
         let raw = &self.core.raw;
@@ -482,9 +493,8 @@ impl DeviceInner {
 
 impl Drop for DeviceInner {
     fn drop(&mut self) {
-        // SAFETY: nothing else can use the device any more. On a lost device the call fails, and destroying is
-        // allowed then too.
-        let _ = unsafe { self.core.raw.device_wait_idle() };
+        // On a lost device it fails, and destroying is allowed then, too.
+        let _ = self.idle();
         let dead = std::mem::take(&mut lock(&self.state).graveyard);
         for (_, garbage) in dead {
             self.destroy(garbage);
