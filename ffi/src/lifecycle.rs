@@ -131,9 +131,11 @@ fn start_renderer(
                 "Relight on {}: {}",
                 info.name,
                 match (info.ray_tracing.is_some(), info.software) {
-                    (true, false) => "rays are traced by hardware",
-                    (_, true) => "rays are traced in software, which is slow",
-                    (false, false) => "rays are traced by compute shaders",
+                    (true, false) => "this graphics driver traces rays itself",
+                    (_, true) =>
+                        "this driver draws on the processor; a traced frame takes a second or more",
+                    (false, false) =>
+                        "this graphics driver has no ray tracing; using compute shaders",
                 }
             );
             session::with(|session| {
