@@ -8,7 +8,7 @@ use crate::numbers;
 use crate::pictures::{check_name, write_rgb};
 use crate::settings::{Assignment, SettingArgs, default, help, value_of};
 use crate::timings::Timings;
-use crate::view::{Camera, load, open};
+use crate::view::{Camera, draw, load, open};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use glam::Vec3;
@@ -383,13 +383,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     // standard output has the JSON only
     let json = args.stats || args.timings;
     for Shot { def, written } in &shots {
-        renderer.begin_frame(def.time_ms);
-        renderer.clear_scene();
-        for entity in &entities {
-            renderer.add_entity(entity);
-        }
-        renderer.render_scene(def)?;
-        let stats = renderer.end_frame()?;
+        let stats = draw(&mut renderer, &entities, def)?;
         timings.add(&renderer.timings(), &stats);
         if let Some(path) = written {
             let picture = renderer.read_pixels()?;

@@ -1,23 +1,27 @@
 //! `relight report`: what the developers ask for when something is wrong, as one file.
 
+use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use relight::GameFiles;
+use renderer_vk::api::{Picture, RefDef};
 use renderer_vk::report::Report;
-use renderer_vk::{Renderer, RendererOptions, Settings};
+use renderer_vk::{Costs, Renderer, RendererOptions, Settings};
 
 use crate::game::Game;
 use crate::messages;
 use crate::pictures::write_whole;
-use crate::view::{Camera, load, open};
+use crate::view::{Camera, draw, load, open};
 
 /// Size of the pictures.
 const SIZE: (u32, u32) = (640, 360);
 /// Frames of each look: enough for GPU times, which arrive a few frames late, and for a filtered picture.
-const FRAMES: u32 = 8;
+const FRAMES: i32 = 8;
+/// Time of the game between two of them, milliseconds.
+const FRAME_MS: i32 = 16;
 
 /// Make one file to send with a question: device, driver, versions, GPU times, messages and two pictures
 ///
@@ -43,13 +47,13 @@ pub struct ReportArgs {
 /// Writes the file.
 ///
 /// # Errors
-/// There is no device, the map cannot be read, or the file cannot be written.
+/// The map cannot be read, the device is lost, or the file cannot be written.
 pub fn run(args: &ReportArgs) -> Result<()> {
-    if !args
+    let zip = args
         .output
         .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("zip"))
-    {
+        .is_some_and(|e| e.eq_ignore_ascii_case("zip"));
+    if !zip {
         bail!("{}: reports are .zip", args.output.display());
     }
     let (files, map) = match &args.map {
@@ -59,47 +63,31 @@ pub fn run(args: &ReportArgs) -> Result<()> {
             relight::sample::MAP.to_owned(),
         ),
     };
-    let mut renderer = Renderer::new(RendererOptions {
+    let mut about = vec![format!("map: {map}")];
+    let renderer = Renderer::new(RendererOptions {
         device: args.device.clone(),
         ..RendererOptions::headless(SIZE.0, SIZE.1)
-    })
-    .context("no report without a Vulkan device")?;
-    let mut settings = Settings::full_size();
-    let (bsp, entities) = load(&mut renderer, files, &map, &settings)?;
-    let camera = Camera::of_map(&bsp).context("the map has no place for a camera")?;
-    let mut pictures = Vec::new();
-    for (name, traced) in [("classic", false), ("traced", true)] {
-        settings.rt = traced;
-        renderer.set_settings(&settings);
-        for frame in 0..FRAMES {
-            let mut def = camera.ref_def(SIZE, 90.0);
-            def.time_ms = i32::try_from(frame * 16).unwrap_or(0);
-            renderer.begin_frame(def.time_ms);
-            renderer.clear_scene();
-            for entity in &entities {
-                renderer.add_entity(entity);
-            }
-            renderer.render_scene(&def)?;
-            renderer.end_frame()?;
-            renderer.timings();
+    });
+    let drawn = match renderer {
+        Ok(renderer) => Some(Drawn::new(renderer, files, &map)?),
+        // That may be what the question is about.
+        Err(error) => {
+            eprintln!("{error}: the report has no pictures");
+            about.push(error.to_string());
+            None
         }
-        pictures.push((name.to_owned(), renderer.read_pixels()?));
-    }
+    };
     let report = Report {
-        about: vec![
-            format!("relight {}", env!("CARGO_PKG_VERSION")),
-            format!(
-                "system: {} {}",
-                std::env::consts::OS,
-                std::env::consts::ARCH
-            ),
-            format!("map: {map}"),
-        ],
-        device: renderer.device_info(),
-        costs: &renderer.costs(),
-        settings: [("r_rt", "1".to_owned()), ("r_picmip", "0".to_owned())].into(),
+        about,
+        device: drawn
+            .as_ref()
+            .map(|drawn| (drawn.renderer.device_info(), &drawn.costs)),
+        settings: drawn
+            .as_ref()
+            .map(|drawn| drawn.settings.clone())
+            .unwrap_or_default(),
         log: &messages::kept(),
-        pictures: &pictures,
+        pictures: drawn.as_ref().map_or(&[], |drawn| &drawn.pictures),
     };
     write_whole(&args.output, &report.zip()?)?;
     println!(
@@ -107,4 +95,43 @@ pub fn run(args: &ReportArgs) -> Result<()> {
         args.output.display()
     );
     Ok(())
+}
+
+/// Pictures of a map in both looks, and what they cost.
+struct Drawn {
+    renderer: Renderer,
+    costs: Costs,
+    settings: HashMap<&'static str, String>,
+    pictures: Vec<(String, Picture)>,
+}
+
+impl Drawn {
+    fn new(mut renderer: Renderer, files: Arc<dyn GameFiles>, map: &str) -> Result<Self> {
+        let mut settings = Settings::full_size();
+        let (bsp, entities) = load(&mut renderer, files, map, &settings)?;
+        let camera = Camera::of_map(&bsp).context("the map has no place for a camera")?;
+        let mut pictures = Vec::new();
+        for (name, traced) in [("classic", false), ("traced", true)] {
+            settings.rt = traced;
+            renderer.set_settings(&settings);
+            for frame in 0..FRAMES {
+                let def = RefDef {
+                    time_ms: frame * FRAME_MS,
+                    ..camera.ref_def(SIZE, 90.0)
+                };
+                draw(&mut renderer, &entities, &def)?;
+                renderer.timings();
+            }
+            pictures.push((name.to_owned(), renderer.read_pixels()?));
+        }
+        let changed = [("r_rt", settings.rt.into()), ("r_picmip", settings.picmip)];
+        Ok(Self {
+            costs: renderer.costs(),
+            settings: changed
+                .map(|(name, value): (_, u32)| (name, value.to_string()))
+                .into(),
+            pictures,
+            renderer,
+        })
+    }
 }

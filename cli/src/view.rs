@@ -11,7 +11,7 @@ use q3bsp::{Bsp, Format};
 use relight::viewpoints::{self, Viewpoint};
 use relight::{GameFiles, LoadError, MemoryFiles, Overlay, Pk3, RelitWorld, SearchPath, map_files};
 use renderer_vk::api::{EntityKind, RefDef, RefEntity};
-use renderer_vk::{Renderer, Settings};
+use renderer_vk::{FrameStats, Renderer, Settings};
 
 /// Opens a map with its game files; also returns its game path.
 ///
@@ -243,6 +243,24 @@ pub fn load(
     let bsp = bsp.context("no map")?;
     let entities = map_entities(renderer, &bsp);
     Ok((bsp, entities))
+}
+
+/// Draws a frame with these entities.
+///
+/// # Errors
+/// The device is lost or out of memory.
+pub fn draw(
+    renderer: &mut Renderer,
+    entities: &[RefEntity],
+    def: &RefDef,
+) -> anyhow::Result<FrameStats> {
+    renderer.begin_frame(def.time_ms);
+    renderer.clear_scene();
+    for entity in entities {
+        renderer.add_entity(entity);
+    }
+    renderer.render_scene(def)?;
+    Ok(renderer.end_frame()?)
 }
 
 /// Entities that the game would add to every view: the map's inline models at rest, and the marks of its mirrors.

@@ -128,15 +128,25 @@ impl Captures {
     /// The next unused `screenshots/shotNNNN` name; `None` if all are in use.
     pub fn next_path(&mut self, format: Format, exists: impl Fn(&str) -> bool) -> Option<String> {
         let next = &mut self.next_number[format as usize];
-        while *next < NUMBERS {
-            let path = format!("screenshots/shot{:04}.{}", *next, format.extension());
-            *next += 1;
-            if !exists(&path) {
-                return Some(path);
-            }
-        }
-        None
+        free_path("screenshots/shot", format.extension(), next, exists)
     }
+}
+
+/// The next unused name `STEMnnnn.EXTENSION`, from the number `next` on; `None` if all are in use.
+pub fn free_path(
+    stem: &str,
+    extension: &str,
+    next: &mut u32,
+    exists: impl Fn(&str) -> bool,
+) -> Option<String> {
+    while *next < NUMBERS {
+        let path = format!("{stem}{:04}.{extension}", *next);
+        *next += 1;
+        if !exists(&path) {
+            return Some(path);
+        }
+    }
+    None
 }
 
 /// Pixels of a picture's row; shorter if the data is.

@@ -1,7 +1,7 @@
 //! Console commands.
 
 use crate::boundary::entry;
-use crate::capture::{Format, Shot, StillShot, still_arguments};
+use crate::capture::{Format, Shot, StillShot, free_path, still_arguments};
 use crate::costs::Report;
 use crate::cvars::Cvar;
 use crate::delivery::{set_variables, take_captures_of_last_frame};
@@ -242,11 +242,9 @@ unsafe extern "C" fn report() {
         let Some(engine) = engine::current() else {
             return Ok(());
         };
-        let taken = |path: &String| {
-            CString::new(path.as_str()).is_ok_and(|path| engine.home_file_exists(&path))
-        };
-        let paths = (0..10_000).map(|number| format!("reports/relight{number:04}.zip"));
-        let Some(path) = { paths }.find(|path| !taken(path)) else {
+        let exists =
+            |path: &str| CString::new(path).is_ok_and(|path| engine.home_file_exists(&path));
+        let Some(path) = free_path("reports/relight", "zip", &mut 0, exists) else {
             engine.say("report: all 10000 file names are taken\n");
             return Ok(());
         };

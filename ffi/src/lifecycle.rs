@@ -131,7 +131,7 @@ fn start_renderer(
                 "Relight on {}: {}",
                 info.name,
                 match (info.ray_tracing.is_some(), info.software) {
-                    (true, false) => "this graphics driver traces rays itself",
+                    (true, false) => "this graphics driver has ray tracing",
                     (_, true) =>
                         "this driver draws on the processor; a traced frame takes a second or more",
                     (false, false) =>

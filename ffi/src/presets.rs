@@ -55,14 +55,13 @@ impl Trial {
             return (None, first);
         }
         // Faster displays are fed less often rather than with a worse picture.
-        let rate = if refresh_rate > 0 {
-            refresh_rate.clamp(30, 120)
-        } else {
-            60
+        let rate = match u16::try_from(refresh_rate) {
+            Ok(0) | Err(_) => 60.0,
+            Ok(rate) => f32::from(rate).clamp(30.0, 120.0),
         };
         let trial = Self {
             left,
-            wanted: SHARE * 1000.0 / f32::from(u8::try_from(rate).unwrap_or(60)),
+            wanted: SHARE * 1000.0 / rate,
             frames: 0,
             begun: now,
             measured: None,

@@ -27,20 +27,13 @@ pub fn zip(
     let map = renderer.world_name().unwrap_or("none");
     let game = engine.cvar_text(c"fs_game");
     let about = vec![
-        format!("Relight {}", env!("CARGO_PKG_VERSION")),
-        format!(
-            "system: {} {}",
-            std::env::consts::OS,
-            std::env::consts::ARCH
-        ),
         format!("engine: {version}, tables of {name}"),
         format!("map: {map}, fs_game \"{game}\""),
         format!("window: {}x{}", front.size.0, front.size.1),
     ];
     let report = Report {
         about,
-        device: renderer.device_info(),
-        costs: &renderer.costs(),
+        device: Some((renderer.device_info(), &renderer.costs())),
         settings: front.cvars.as_ref().map(Cvars::texts).unwrap_or_default(),
         log: &logging::newest(),
         pictures: &pictures,

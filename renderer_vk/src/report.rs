@@ -15,12 +15,10 @@ use crate::statistics::Costs;
 /// What a report holds.
 #[derive(Debug)]
 pub struct Report<'a> {
-    /// Name and version of the program, and what it runs in, a line each.
+    /// What the program runs in, and on what, a line each. Version and system are added.
     pub about: Vec<String>,
-    /// The device in use.
-    pub device: &'a DeviceInfo,
-    /// GPU times and memory.
-    pub costs: &'a Costs,
+    /// The device in use, and its GPU times and memory; `None` if there is no usable device.
+    pub device: Option<(&'a DeviceInfo, &'a Costs)>,
     /// Values of settings, by name of the console variable; those that are absent have their defaults.
     pub settings: HashMap<&'static str, String>,
     /// Messages, oldest first.
@@ -56,10 +54,15 @@ impl Report<'_> {
             zip.write_all(person.removed_from(text).as_bytes())?;
             Ok(())
         };
-        text("about.txt", &lines(&self.about))?;
-        text("device.txt", &format!("{:#?}\n", self.device))?;
+        let (system, kind) = (std::env::consts::OS, std::env::consts::ARCH);
+        let version = env!("CARGO_PKG_VERSION");
+        let about = format!("Relight {version}\nsystem: {system} {kind}\n");
+        text("about.txt", &(about + &lines(&self.about)))?;
+        if let Some((device, costs)) = self.device {
+            text("device.txt", &format!("{device:#?}\n"))?;
+            text("timings.json", &costs.json())?;
+        }
         text("settings.txt", &self.settings())?;
-        text("timings.json", &self.costs.json())?;
         text("log.txt", &lines(self.log))?;
         for (name, picture) in self.pictures {
             let mut png = Vec::new();
@@ -132,8 +135,10 @@ impl Person {
                     .replace(&home.replace('\\', "/"), "~");
             }
         }
-        for folder in ["/home/", "/Users/", "\\Users\\"] {
-            text = without_next_name(&text, folder);
+        text = without_next_name(&text, "/home/", " /\\\":\n");
+        for folder in ["/Users/", "\\Users\\"] {
+            // names may have spaces there
+            text = without_next_name(&text, folder, "/\\\":\n");
         }
         for name in self
             .names
@@ -146,14 +151,12 @@ impl Person {
     }
 }
 
-/// Replaces the name that follows `folder` in paths.
-fn without_next_name(text: &str, folder: &str) -> String {
+/// Replaces the name that follows `folder` in paths, up to one of the characters `ends`.
+fn without_next_name(text: &str, folder: &str, ends: &str) -> String {
     let mut parts = text.split(folder);
     let mut out = parts.next().unwrap_or_default().to_owned();
     for part in parts {
-        let end = part
-            .find(['/', '\\', '"', '\n', ' ', ':'])
-            .unwrap_or(part.len());
+        let end = part.find(|c| ends.contains(c)).unwrap_or(part.len());
         out.push_str(folder);
         out.push_str("USER");
         out.push_str(part.get(end..).unwrap_or_default());
@@ -189,7 +192,7 @@ mod tests {
             names: vec!["jane".to_owned(), "pc".to_owned()],
         };
         let text = "read /home/jane/.q3a/x and C:\\Users\\Jane Doe\\AppData, C:/Users/Jane Doe/y\n\
-                    /home/bob/maps by jane, janet\\Users\\Eve\\z";
+                    /home/bob/maps by jane, janet\\Users\\Eve Roe\\z";
         let found = person.removed_from(text);
         assert_eq!(
             found,

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use crate::game::Maps;
 use crate::render::{parse_size, parse_view};
 use crate::settings::{Assignment, SettingArgs, default, help, value_of};
-use crate::view::{Camera, load, open};
+use crate::view::{Camera, draw, load, open};
 
 /// Compare the ways to sample lights: all have the same mean
 ///
@@ -102,14 +102,8 @@ impl Stage {
         let mut early = Vec::new();
         let mut times = Vec::new();
         for frame in 1..=frames {
-            self.renderer.begin_frame(0);
-            self.renderer.clear_scene();
-            for entity in &self.entities {
-                self.renderer.add_entity(entity);
-            }
-            self.renderer
-                .render_scene(&self.camera.ref_def(self.size, 90.0))?;
-            self.renderer.end_frame()?;
+            let def = self.camera.ref_def(self.size, 90.0);
+            draw(&mut self.renderer, &self.entities, &def)?;
             if NOISE_FRAMES.contains(&frame) {
                 early.push((frame, self.renderer.read_radiance()?));
             }

@@ -17,7 +17,7 @@ use crate::cameras::places;
 use crate::game::Maps;
 use crate::render::parse_size;
 use crate::settings::SettingArgs;
-use crate::view::{Camera, load, map_name, open};
+use crate::view::{Camera, draw, load, map_name, open};
 
 /// Draw views in the classic and the traced look, side by side, and compare their brightness and colour
 ///
@@ -223,13 +223,7 @@ fn one(args: &LooksArgs, map: &str) -> Result<Sums> {
                 1
             };
             for _ in 0..frames {
-                renderer.begin_frame(def.time_ms);
-                renderer.clear_scene();
-                for entity in &entities {
-                    renderer.add_entity(entity);
-                }
-                renderer.render_scene(&def)?;
-                renderer.end_frame()?;
+                draw(&mut renderer, &entities, &def)?;
             }
             let picture = renderer.read_pixels()?;
             let picture = Rgb8::new(width as usize, height as usize, picture.rgb)?;
