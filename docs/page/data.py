@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes data.js of the page: places of its pictures, film, map, and the measurements of lab/data and lab/runs.
 
-usage: data.py --out FOLDER --frames N --map NAME     (scripts/page runs it)
+usage: data.py --out FOLDER --frames N --map NAME --start NODE     (scripts/page runs it)
 """
 import argparse
 import json
@@ -55,6 +55,7 @@ def main():
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--frames", type=int, required=True)
     parser.add_argument("--map", required=True)
+    parser.add_argument("--start", required=True, help="the spawn point at which the walk begins: its node in the GLB")
     given = parser.parse_args()
     out = given.out
     films = sorted(out.glob("film.*"))
@@ -69,7 +70,7 @@ def main():
         "pairs": found,
         "film": {"file": films[0].name, "megabytes": megabytes(films[0])} if films else None,
         "walk": {
-            "map": given.map, "file": glb.name, "bytes": glb.stat().st_size, "mapMegabytes": megabytes(glb),
+            "map": given.map, "file": glb.name, "start": given.start, "bytes": glb.stat().st_size, "mapMegabytes": megabytes(glb),
             "megabytes": round(megabytes(glb) + three, 1), "cover": covers[0] if covers else None,
         } if glb.exists() else None,
         "lab": {name: json.loads((ROOT / f"lab/data/{name}.json").read_text()) for name in TABLES},

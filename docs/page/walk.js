@@ -7,6 +7,8 @@ import { steer } from "./walk-input.js";
 
 // The engine's player in metres (1/32 of its units) and seconds.
 const RADIUS = 0.4, HEIGHT = 1.75, EYE = 1.6, STEP = 0.6, SPEED = 8, GRAVITY = 25, JUMP = 8.4;
+// Who is so far below the start has left the map.
+const FALLEN = 100;
 // What opens, moves or vanishes in the game must not stand in the way here.
 const PASSABLE = /^(func_(door|plat|bobbing|train|button)|trigger_)/;
 
@@ -89,7 +91,7 @@ class Walker {
     const floor = this.push(new THREE.Vector3(0, this.fall * seconds, 0));
     this.stands = Boolean(floor && floor.y > 0.5);
     if (floor && (this.stands || this.fall > 0)) this.fall = Math.min(this.fall, 0) * (this.stands ? 0 : 1);
-    if (this.capsule.start.y < this.lowest - 20) this.reset();
+    if (this.capsule.start.y < this.start.y - FALLEN) this.reset();
   }
 
   /** Places the camera at the eye. */
@@ -100,16 +102,16 @@ class Walker {
   }
 }
 
-/** The camera of the first spawn point: position and yaw. */
-function spawn(gltf) {
-  const camera = gltf.cameras.find((c) => /player|spawn/.test(c.parent?.name ?? c.name)) ?? gltf.cameras[0];
+/** The camera of a spawn point: position and yaw. */
+function spawn(gltf, node) {
+  const camera = gltf.cameras.find((c) => c.name === `${node}_camera` || c.parent?.name === `${node}_camera`) ?? gltf.cameras[0];
   if (!camera) return { position: new THREE.Vector3(), yaw: 0 };
   camera.updateWorldMatrix(true, false);
   const turn = new THREE.Euler().setFromQuaternion(camera.getWorldQuaternion(new THREE.Quaternion()), "YXZ");
   return { position: camera.getWorldPosition(new THREE.Vector3()), yaw: turn.y };
 }
 
-export async function begin({ file, bytes }) {
+export async function begin({ file, bytes, start }) {
   const [canvas, cover, progress, message] =
     ["walk-canvas", "walk-cover", "walk-progress", "walk-message"].map((id) => document.getElementById(id));
   progress.hidden = false;
@@ -121,9 +123,8 @@ export async function begin({ file, bytes }) {
   canvas.hidden = false;
   const renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
   const camera = new THREE.PerspectiveCamera(70, 1, 0.05, 4000);
-  const { position, yaw } = spawn(gltf);
+  const { position, yaw } = spawn(gltf, start);
   const walker = new Walker(obstacles(gltf.scene), position, yaw);
-  walker.lowest = new THREE.Box3().setFromPoints([position]).min.y - 100;
   cover.hidden = true;
   progress.hidden = true;
 
@@ -149,7 +150,7 @@ export async function begin({ file, bytes }) {
     renderer.render(gltf.scene, camera);
   };
   // Nothing is drawn while the walk is out of sight.
-  new IntersectionObserver(([{ isIntersecting }]) => renderer.setAnimationLoop(isIntersecting ? frame : null)).observe(canvas);
+  new IntersectionObserver((seen) => renderer.setAnimationLoop(seen.at(-1).isIntersecting ? frame : null)).observe(canvas);
   canvas.focus({ preventScroll: true });
   return { renderer, camera, walker, scene: gltf.scene };
 }
