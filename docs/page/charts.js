@@ -1,6 +1,9 @@
 // Charts as SVG: rows of dots by name, sorted dots, and points with whiskers by commit. Each has its table.
 "use strict";
 
+// Charts are as wide as a narrow window, so that their text keeps its size.
+const WIDTH = Math.min(600, Math.max(330, document.documentElement.clientWidth - 28));
+
 function svg(name, attributes = {}, ...children) {
   const made = document.createElementNS("http://www.w3.org/2000/svg", name);
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
@@ -63,8 +66,8 @@ function chart({ id, title, legend = [], drawing, note, head, rows, wide = false
 }
 
 /** One line for each row, one dot for each of its values along the line. `equal` is a value to compare with. */
-function dotRows(rows, { unit, equal, log, zero, left = 176 }) {
-  const width = 600, top = 4, line = 22, bottom = top + rows.length * line;
+function dotRows(rows, { unit, equal, log, zero, left = 172 }) {
+  const width = WIDTH, top = 4, line = 22, bottom = top + rows.length * line;
   const x = scale([...rows.flatMap((r) => r.values.filter((v) => v != null)), ...(equal ? [equal] : [])], left, width - 16, { log, zero });
   const drawn = svg("svg", { viewBox: `0 0 ${width} ${bottom + 36}` });
   for (const tick of x.ticks) {
@@ -83,7 +86,7 @@ function dotRows(rows, { unit, equal, log, zero, left = 176 }) {
 
 /** Series of values, each sorted by itself, so that a height is read as a share of the rows. */
 function sortedDots(series, names, { unit, log, equal }) {
-  const width = 600, height = 300, left = 44, bottom = height - 34;
+  const width = WIDTH, height = 300, left = 44, bottom = height - 34;
   const y = scale(series.flatMap((s) => s.map((p) => p.value)), bottom, 24, { log });
   const drawn = svg("svg", { viewBox: `0 0 ${width} ${height}` });
   for (const tick of y.ticks) {
@@ -102,7 +105,7 @@ function sortedDots(series, names, { unit, log, equal }) {
 /** By commit, in the order of time: the median as a dot, a line from the least to the most. `points` have `run`,
     `series`, `values`; points of one series are joined. */
 function byCommit(points, runs, { unit, log }) {
-  const width = 600, height = 250, left = 52, bottom = height - 50;
+  const width = WIDTH, height = 250, left = 52, bottom = height - 50;
   const y = scale(points.flatMap((p) => p.values), bottom, 24, { log });
   const drawn = svg("svg", { viewBox: `0 0 ${width} ${height}` });
   for (const tick of y.ticks) {
@@ -110,13 +113,15 @@ function byCommit(points, runs, { unit, log }) {
       text(left - 6, y.at(tick) + 4, figure(tick), "end"));
   }
   const slot = (width - left) / runs.length;
-  const x = (run, s) => left + (runs.indexOf(run) + 0.5) * slot + (s - 0.5) * Math.min(14, slot / 4);
-  const every = Math.ceil(runs.length / 9);
+  const kinds = 1 + Math.max(...points.map((p) => p.series));
+  const x = (run, s) => left + (runs.indexOf(run) + 0.5) * slot + (s - (kinds - 1) / 2) * Math.min(24, slot / (kinds + 1));
+  const middleOf = (run) => x(run, (kinds - 1) / 2);
+  const every = Math.ceil((runs.length * 58) / (width - left));
   runs.forEach((run, i) => {
     if ((runs.length - 1 - i) % every) return;
-    drawn.append(text(x(run, 0.5), bottom + 18, run.commit.slice(0, 7), "middle"), text(x(run, 0.5), bottom + 33, run.date.slice(5, 10), "middle"));
+    drawn.append(text(middleOf(run), bottom + 18, run.commit.slice(0, 7), "middle"), text(middleOf(run), bottom + 33, run.date.slice(5, 10), "middle"));
   });
-  drawn.append(text(width, bottom + 48, `commit and day, in order${every > 1 ? `; every ${every}. is named` : ""}`, "end"), text(0, 10, unit));
+  drawn.append(text(width, bottom + 48, `commit and day, in order${every > 1 ? `; one in ${every} is named` : ""}`, "end"), text(0, 10, unit));
   for (const s of new Set(points.map((p) => p.series))) {
     const own = points.filter((p) => p.series === s);
     const middle = (p) => y.at(quantile(p.values, 0.5)).toFixed(1);

@@ -13,7 +13,7 @@
     const found = timeline.flatMap((run) => run.metrics.filter((m) => m.name === name && (!over || m.over === over)).map((m) => ({ run, ...m })));
     if (found.length === 0) return;
     const kinds = [...new Set(found.map((m) => `${m.of}${m.over === "maps" ? "" : `, ${m.run.device}`}`))];
-    const points = found.map((m) => ({ ...m, series: kinds.indexOf(`${m.of}${m.over === "maps" ? "" : `, ${m.run.device}`}`) % 3, name: m.of }));
+    const points = found.map((m) => ({ ...m, series: kinds.indexOf(`${m.of}${m.over === "maps" ? "" : `, ${m.run.device}`}`), name: m.of }));
     const shown = timeline.filter((run) => points.some((p) => p.run === run));
     const { unit } = found[0];
     charts.append(chart({

@@ -156,6 +156,8 @@ def main():
             for width, scheme in [(1280, "light"), (1280, "dark"), (400, "light")]:
                 page.size(width, 900)
                 page.scheme(scheme)
+                if width < 600:
+                    page.open(f"{address}?narrow")  # charts are drawn for the window's width
                 page.wait("new Promise((done) => setTimeout(() => done(true), 800))")
                 page.picture(given.pictures / f"page-{width}-{scheme}.png", whole=True)
         foreign = [url for url in page.requests if not url.startswith((address, "data:", "blob:", "about:"))]
