@@ -10,6 +10,8 @@ import argparse
 import json
 import os
 import re
+import shlex
+import signal
 import subprocess
 import sys
 import tempfile
@@ -48,58 +50,67 @@ def write(label, run):
     print(path.relative_to(ROOT))
 
 
-def measure(given):
+def measured(given, folder):
+    """The metrics, one after the other, and the device's name with those that used one."""
     relight = os.environ.get("RELIGHT", str(ROOT / "target/release/relight"))
+    first = given.maps[0]
+    where = f"{first} {given.size}"
+
+    def render(name, *options):
+        target = f"{folder}/{name}.png"
+        select = ["--device", given.device] if given.device else []
+        return target, output([relight, "render", first, "--size", given.size, *select, *options, "-o", target])
+
+    def compare(reference, other):
+        found = re.search(r"SSIM ([\d.]+), FLIP ([\d.]+).*luminance ([\d.]+) and ([\d.]+)",
+                          output([relight, "compare", reference, other]))
+        return [float(number) for number in found.groups()]
+
+    for game_map in given.maps:
+        stops = []
+        for seed in range(1, given.runs + 1):
+            line = output([relight, "calibration", game_map, "--seed", str(seed), "--json"])
+            stops.append(round(json.loads(line.splitlines()[0])["after"]["median_stops"], 4))
+        yield metric("calibration error", game_map, "stops", "seeds", stops), None
+    for look in ["classic", "traced"]:
+        times = []
+        for _ in range(given.runs):
+            printed = render("frame", "--look", look, "--no-accumulation", "--timings", "--turn", "--spp", str(given.frames))[1]
+            cost = json.loads(next(line for line in printed.splitlines() if line.startswith("{")))
+            times.append(round(cost["gpu_ms"]["median"], 3))
+        yield metric(f"frame, {look} look", where, "ms", "runs", times), cost["device"]
+    likeness, brightness = [], []
+    for spawn in range(given.views):
+        view = ["--spawn", str(spawn)]
+        reference = render("reference", *view, "--spp", str(given.reference))[0]
+        frame = render("frame", *view, "--no-accumulation", "--spp", "16")[0]
+        classic = render("classic", *view, "--look", "classic")[0]
+        likeness.append(compare(reference, frame)[0])
+        luminance = compare(classic, reference)[2:]
+        brightness.append(round(luminance[1] / luminance[0], 3))
+    yield metric("SSIM of the 16th frame", where, f"against {given.reference} frames", "views", likeness), None
+    yield metric("brightness", where, "traced / classic", "views", brightness), None
+
+
+def measure(given):
     changed = git("status", "--porcelain", "--", "*.rs", "*.toml", "Cargo.lock", "shaders")
     if changed and not given.commit:
         sys.exit(f"The sources differ from the commit; commit or stash them:\n{changed}")
     commit = git("rev-parse", given.commit or "HEAD")
-    metrics, device = [], []
-    with tempfile.TemporaryDirectory() as folder:
-        def render(name, game_map, *options):
-            target = f"{folder}/{name}.png"
-            select = ["--device", given.device] if given.device else []
-            return target, output([relight, "render", game_map, "--size", given.size, *select, *options, "-o", target])
-
-        def compare(reference, other):
-            found = re.search(r"SSIM ([\d.]+), FLIP ([\d.]+).*luminance ([\d.]+) and ([\d.]+)",
-                              output([relight, "compare", reference, other]))
-            return [float(number) for number in found.groups()]
-
-        for game_map in given.maps:
-            print(f"{game_map}: calibration", flush=True)
-            stops = []
-            for seed in range(1, given.runs + 1):
-                line = output([relight, "calibration", game_map, "--seed", str(seed), "--json"])
-                stops.append(round(json.loads(line.splitlines()[0])["after"]["median_stops"], 4))
-            metrics.append(metric("calibration error", game_map, "stops", "seeds", stops))
-            for look in ["classic", "traced"]:
-                print(f"{game_map}: frames of the {look} look", flush=True)
-                times = []
-                for _ in range(given.runs):
-                    printed = render("frame", game_map, "--look", look, "--no-accumulation", "--timings", "--turn",
-                                     "--spp", str(given.frames))[1]
-                    cost = json.loads(next(line for line in printed.splitlines() if line.startswith("{")))
-                    times.append(round(cost["gpu_ms"]["median"], 3))
-                    device = [cost["device"]]
-                metrics.append(metric(f"frame, {look} look", f"{game_map} {given.size}", "ms", "runs", times))
-            likeness, brightness = [], []
-            for spawn in range(given.views):
-                print(f"{game_map}: view {spawn}", flush=True)
-                view = ["--spawn", str(spawn)]
-                reference = render("reference", game_map, *view, "--spp", str(given.reference))[0]
-                frame = render("frame", game_map, *view, "--no-accumulation", "--spp", "16")[0]
-                classic = render("classic", game_map, *view, "--look", "classic")[0]
-                likeness.append(compare(reference, frame)[0])
-                luminance = compare(classic, reference)[2:]
-                brightness.append(round(luminance[1] / luminance[0], 3))
-            where = f"{game_map} {given.size}"
-            metrics.append(metric("SSIM of the 16th frame", where, f"against {given.reference} frames", "views", likeness))
-            metrics.append(metric("brightness", where, "traced / classic", "views", brightness))
+    metrics, devices = [], []
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            for made, device in measured(given, folder):
+                print(f"{made['name']}, {made['of']}: {made['values']} {made['unit']}", flush=True)
+                metrics.append(made)
+                devices += [device] if device else []
+    except KeyboardInterrupt:
+        print("Interrupted: the file has what is complete.")
     write(given.label, {
         "commit": commit, "date": git("log", "-1", "--format=%cI", commit), "measured": date.today().isoformat(),
-        "device": given.machine or device[0],
-        "command": " ".join(["lab/run.py", *sys.argv[1:]]), "source": None, "metrics": metrics,
+        "device": given.machine or (devices or ["processor"])[0], "command": shlex.join(["lab/run.py", *sys.argv[1:]]),
+        "source": None, "metrics": metrics,
     })
 
 
@@ -139,9 +150,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--from-notes", action="store_true", help="read measured tables out of git's history")
     parser.add_argument("--commit", help="the commit that the command is built from (default: HEAD, with unchanged sources)")
-    parser.add_argument("--maps", nargs="+", default=["oa_dm1", "oasago2"])
+    parser.add_argument("--maps", nargs="+", default=["oasago2", "oa_dm1"], help="maps to calibrate; the first is also drawn")
     parser.add_argument("--runs", type=int, default=5, help="runs of each time, seeds of each calibration (default 5)")
-    parser.add_argument("--views", type=int, default=5, help="spawn points of each map (default 5)")
+    parser.add_argument("--views", type=int, default=5, help="spawn points of the first map (default 5)")
     parser.add_argument("--size", default="320x180")
     parser.add_argument("--frames", type=int, default=24, help="frames of a timed run (default 24)")
     parser.add_argument("--reference", type=int, default=256, help="frames of a reference picture (default 256)")

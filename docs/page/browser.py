@@ -105,6 +105,13 @@ class Browser:
             button = "none" if kind == "mouseMoved" and not buttons else "left"
             self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, buttons=buttons, clickCount=1)
 
+    def touch(self, start, end):
+        """A finger from one point to another."""
+        self.call("Emulation.setTouchEmulationEnabled", enabled=True)
+        for kind, points in [("touchStart", [start]), ("touchMove", [end]), ("touchEnd", [])]:
+            self.call("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": x, "y": y} for x, y in points])
+        self.call("Emulation.setTouchEmulationEnabled", enabled=False)
+
     def middle(self, selector, part=0.5):
         """The point at a part of an element's width and in the middle of its height, after scrolling to it."""
         return self.run(f"""(() => {{ const e = document.querySelector({json.dumps(selector)});

@@ -104,9 +104,9 @@ function sortedDots(series, names, { unit, log, equal }) {
 
 /** By commit, in the order of time: the median as a dot, a line from the least to the most. `points` have `run`,
     `series`, `values`; points of one series are joined. */
-function byCommit(points, runs, { unit, log }) {
+function byCommit(points, runs, { unit, log, zero }) {
   const width = WIDTH, height = 250, left = 52, bottom = height - 50;
-  const y = scale(points.flatMap((p) => p.values), bottom, 24, { log });
+  const y = scale(points.flatMap((p) => p.values), bottom, 24, { log, zero });
   const drawn = svg("svg", { viewBox: `0 0 ${width} ${height}` });
   for (const tick of y.ticks) {
     drawn.append(svg("line", { class: "grid", x1: left, x2: width, y1: y.at(tick), y2: y.at(tick) }),

@@ -9,7 +9,7 @@
 
   const timeline = [...runs].sort((a, b) => a.date.localeCompare(b.date));
   /** A chart by commit of the metrics of one name. Each kind (map, device) is a series. */
-  function history(id, title, name, sentence, { over, log = false, wide = false }) {
+  function history(id, title, name, sentence, { over, log = false, zero = false, wide = false }) {
     const found = timeline.flatMap((run) => run.metrics.filter((m) => m.name === name && (!over || m.over === over)).map((m) => ({ run, ...m })));
     if (found.length === 0) return;
     const kinds = [...new Set(found.map((m) => `${m.of}${m.over === "maps" ? "" : `, ${m.run.device}`}`))];
@@ -17,7 +17,7 @@
     const shown = timeline.filter((run) => points.some((p) => p.run === run));
     const { unit } = found[0];
     charts.append(chart({
-      id, title, legend: kinds, wide, drawing: byCommit(points, shown, { unit, log }),
+      id, title, legend: kinds, wide, drawing: byCommit(points, shown, { unit, log, zero }),
       note: sentence, head: ["commit", "day", "of", "device", "median", "least", "most", "values", "command"],
       rows: points.map((p) => [p.run.commit.slice(0, 9), p.run.date.slice(0, 10), p.of, p.run.device, middle(p.values),
         figure(Math.min(...p.values)), figure(Math.max(...p.values)), `${p.values.length} ${p.over}`, p.run.command]),
@@ -36,7 +36,7 @@
   }));
   history("chart-calibration-commits", "Calibration by commit: error over the maps", "calibration error",
     "A dot is the median of the 72 maps, the line reaches from the best to the worst map. From the calibration note’s table in git’s history; " +
-    "on 2026-11-22 also the choice of texels that are held out changed.", { over: "maps", log: true });
+    "on 2026-11-22 also the choice of texels that are held out changed.", { over: "maps", zero: true });
 
   // Quality
   const quality = lab["quality-places"].rows;

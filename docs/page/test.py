@@ -125,6 +125,10 @@ def check_walk(page):
     after = page.run(where)
     way = sum((a - b) ** 2 for a, b in zip(before, after)) ** 0.5
     check(way > 0.5, f"the key W walks ({way:.2f} m)")
+    yaw = "relightWalk.walker.yaw"
+    before_touch = page.run(yaw)
+    page.touch(page.middle("#walk-canvas", 0.8), page.middle("#walk-canvas", 0.7))
+    check(abs(page.run(yaw) - before_touch) > 0.1, "a finger on the right half turns")
     check(abs(after[1] - before[1]) < 3, f"the floor bears the walker ({after[1] - before[1]:+.2f} m)")
 
 
