@@ -78,7 +78,7 @@
   }));
   for (const look of ["traced", "classic"]) {
     history(`chart-times-${look}-commits`, `Speed by commit: a frame of the ${look} look`, `frame, ${look} look`,
-      "GPU time; a run’s figure is the median of its frames. A dot is the median of the runs, the line reaches from the fastest to the slowest.", {});
+      "GPU time; a run’s figure is the median of its frames. A dot is the median of the runs, the line reaches from the fastest to the slowest.", { zero: true });
   }
   history("chart-seeds-commits", "Calibration by commit: error over choices of texels", "calibration error",
     "Two maps, each calibrated with several seeds; a dot is the median, the line reaches from the least to the most.", { over: "seeds" });
