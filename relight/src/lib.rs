@@ -9,6 +9,7 @@
 //! * [`mod@image`]: texture images as the engine reads them.
 //! * [`materials`]: scripts and implicit materials by name.
 //! * [`overbright`]: overbright bits, gamma and sRGB.
+//! * [`probe`]: rays into a map: the surface at a place, and the light that reaches it.
 //! * [`sample`]: a small synthetic game for demonstrations and tests without game data.
 //! * [`viewpoints`]: where players appear, and what they see there.
 //! * [`world`]: a map with flat geometry, resolved materials and its light sources.
@@ -45,6 +46,7 @@ mod map_files;
 pub mod materials;
 mod occluders;
 pub mod overbright;
+pub mod probe;
 pub mod sample;
 pub mod viewpoints;
 pub mod world;

@@ -63,7 +63,7 @@ mod suns;
 mod tests;
 mod texels;
 mod trace_cache;
-mod triangle_lights;
+pub(crate) mod triangle_lights;
 mod triangulation;
 mod vertices;
 

@@ -43,7 +43,7 @@ pub(super) fn contributions(
             // While a light style is fitted, the world has no lights, but still its lists.
             continue;
         };
-        let geometric = lambert(sample, light) / PI;
+        let geometric = lambert(sample.position, sample.normal, light) / PI;
         let expected = geometric * light.radiance.element_sum() / 3.0;
         if expected <= 0.0 {
             continue;
@@ -52,7 +52,7 @@ pub(super) fn contributions(
         if chance < 1.0 && random.uniform() >= chance {
             continue;
         }
-        let seen = visible_part(occluders, sample, light, random);
+        let seen = visible_part(occluders, sample.position, sample.normal, light, random);
         let number = if light.has_own_cutoff() {
             index
         } else {
@@ -75,18 +75,19 @@ pub(super) fn contributions(
     buckets
 }
 
-/// Visible fraction of a triangle: one ray to its centroid, or several to a large triangle.
-fn visible_part(
+/// Visible fraction of a triangle at a point of a surface: one ray to its centroid, or several to a large triangle.
+pub(crate) fn visible_part(
     occluders: &Occluders,
-    sample: &Sample,
+    position: Vec3,
+    normal: Vec3,
     light: &TriangleLight,
     random: &mut Random,
 ) -> f32 {
     let [a, b, c] = light.vertices;
     let middle = (a + b + c) / 3.0;
-    let clear = |to: Vec3| !occluders.blocked(sample.position, to, false);
-    let wide = light.area() > LARGE * middle.distance_squared(sample.position);
-    if !wide && sample.normal.dot(middle - sample.position) > 0.0 {
+    let clear = |to: Vec3| !occluders.blocked(position, to, false);
+    let wide = light.area() > LARGE * middle.distance_squared(position);
+    if !wide && normal.dot(middle - position) > 0.0 {
         return f32::from(u8::from(clear(middle)));
     }
     let mut rays = 0.0f32;
@@ -94,7 +95,7 @@ fn visible_part(
     for _ in 0..RAYS * 3 {
         let (u, v) = random.in_triangle();
         let to = a + (b - a) * u + (c - a) * v;
-        if sample.normal.dot(to - sample.position) <= 0.0 {
+        if normal.dot(to - position) <= 0.0 {
             continue;
         }
         rays += 1.0;
@@ -108,16 +109,16 @@ fn visible_part(
     if rays > 0.0 { open / rays } else { 0.0 }
 }
 
-/// Irradiance from a triangle of radiance 1, clipped at the sample's horizon, without shadows.
+/// Irradiance from a triangle of radiance 1 at a point of a surface, clipped at its horizon, without shadows.
 ///
 /// Source: Lambert's formula for polygons: half the sum over the edges of angle times cosine.
-fn lambert(sample: &Sample, light: &TriangleLight) -> f32 {
-    let [a, b, c] = light.vertices.map(|v| v - sample.position);
+pub(crate) fn lambert(position: Vec3, normal: Vec3, light: &TriangleLight) -> f32 {
+    let [a, b, c] = light.vertices.map(|v| v - position);
     let facing = -(b - a).cross(c - a).dot(a);
     if facing <= 0.0 && !light.two_sided {
         return 0.0;
     }
-    let heights = [a, b, c].map(|v| v.dot(sample.normal));
+    let heights = [a, b, c].map(|v| v.dot(normal));
     if heights.iter().all(|h| *h <= 0.0) {
         return 0.0;
     }
@@ -130,7 +131,7 @@ fn lambert(sample: &Sample, light: &TriangleLight) -> f32 {
         .max((c - middle).length_squared());
     if extent < 0.01 * squared && heights.iter().all(|h| *h > 0.0) {
         let area = (b - a).cross(c - a) * 0.5;
-        return middle.dot(sample.normal) * area.dot(middle).abs() / (squared * squared);
+        return middle.dot(normal) * area.dot(middle).abs() / (squared * squared);
     }
     let mut polygon = [Vec3::ZERO; 4];
     let mut count = 0;
@@ -162,7 +163,7 @@ fn lambert(sample: &Sample, light: &TriangleLight) -> f32 {
         let length = cross.length();
         if length > 1e-12 {
             let angle = length.atan2(from.dot(to));
-            sum += angle * cross.dot(sample.normal) / length;
+            sum += angle * cross.dot(normal) / length;
         }
     }
     (sum.abs() / 2.0).min(TAU / 2.0)
@@ -234,11 +235,14 @@ mod tests {
                     }
                 }
             }
-            let found = lambert(&sample, &light);
+            let found = lambert(sample.position, sample.normal, &light);
             assert!((found / sum - 1.0).abs() < 0.01, "{found} {sum}");
         }
         let [a, b, c] = near;
-        assert_eq!(lambert(&sample, &light([a, c, b], false)), 0.0);
-        assert!(lambert(&sample, &light([a, c, b], true)) > 0.1);
+        assert_eq!(
+            lambert(sample.position, sample.normal, &light([a, c, b], false)),
+            0.0
+        );
+        assert!(lambert(sample.position, sample.normal, &light([a, c, b], true)) > 0.1);
     }
 }

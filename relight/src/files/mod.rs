@@ -110,27 +110,35 @@ pub trait GameFiles {
     }
 }
 
-impl<T: GameFiles + ?Sized> GameFiles for &T {
-    fn read(&self, path: &str) -> Result<Option<Vec<u8>>, FileError> {
-        (**self).read(path)
-    }
+/// Game files behind a pointer.
+macro_rules! behind {
+    ($pointer:ty) => {
+        impl<T: GameFiles + ?Sized> GameFiles for $pointer {
+            fn read(&self, path: &str) -> Result<Option<Vec<u8>>, FileError> {
+                (**self).read(path)
+            }
 
-    fn list(&self, dir: &str, extension: &str) -> Vec<String> {
-        (**self).list(dir, extension)
-    }
+            fn list(&self, dir: &str, extension: &str) -> Vec<String> {
+                (**self).list(dir, extension)
+            }
 
-    fn variable(&self, name: &str) -> String {
-        (**self).variable(name)
-    }
+            fn variable(&self, name: &str) -> String {
+                (**self).variable(name)
+            }
 
-    fn precedence(&self) -> Precedence {
-        (**self).precedence()
-    }
+            fn precedence(&self) -> Precedence {
+                (**self).precedence()
+            }
 
-    fn exists(&self, path: &str) -> bool {
-        (**self).exists(path)
-    }
+            fn exists(&self, path: &str) -> bool {
+                (**self).exists(path)
+            }
+        }
+    };
 }
+
+behind!(&T);
+behind!(std::sync::Arc<T>);
 
 /// The canonical spelling of a game path: lower case (ASCII), `/` between components, no empty
 /// component and no `.`.

@@ -104,6 +104,12 @@ pub(super) fn linear(value: f32, fade: f32) -> (f32, Falloff) {
     (intensity, Falloff::Linear { reach })
 }
 
+/// Value and `fade` of a [`linear`] light of an intensity that reaches so far.
+pub(super) fn value_and_fade(intensity: f32, reach: f32) -> (f32, f32) {
+    let near = intensity / (SUN_IRRADIANCE * 0.5 * (reach * 0.5) * (reach * 0.5));
+    (near / (7500.0 * LINEAR_SCALE), near / reach)
+}
+
 /// Ambient radiance: the compiler adds `ambient` to every texel and raises texels to `_minlight`.
 pub(crate) fn ambient(entities: &[Entity]) -> Vec3 {
     let Some(world) = entities.first() else {
