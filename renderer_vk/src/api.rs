@@ -106,6 +106,19 @@ pub struct RefDef {
     pub area_mask: [u8; 32],
     /// Strings of `deformVertexes text0..7`, NUL-terminated.
     pub text: [[u8; 32]; 8],
+    /// Draws the view in this look instead of that of the settings.
+    pub look: Option<Look>,
+    /// Draws only this part of the view: left, top, width, height, window pixels. The traced look draws all of it.
+    pub part: Option<[i32; 4]>,
+}
+
+/// A look of a view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Look {
+    /// As the engine's own renderer draws it.
+    Classic,
+    /// Ray traced.
+    Traced,
 }
 
 impl Default for RefDef {
@@ -123,6 +136,8 @@ impl Default for RefDef {
             flags: 0,
             area_mask: [0; 32],
             text: [[0; 32]; 8],
+            look: None,
+            part: None,
         }
     }
 }
@@ -209,4 +224,52 @@ pub struct CinematicFrame<'a> {
     pub client: usize,
     /// The pixels have changed. Otherwise a texture of the same size keeps its content.
     pub dirty: bool,
+}
+
+/// A vertex of a user interface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UiVertex {
+    /// Window pixels from the left and the top.
+    pub position: Vec2,
+    /// Texture coordinates.
+    pub st: Vec2,
+    /// Display-encoded colour, multiplied by alpha.
+    pub rgba: [u8; 4],
+}
+
+/// Triangles of a user interface with one texture.
+#[derive(Clone, Debug, Default)]
+pub struct UiMesh {
+    /// Number of a [`UiTexture`].
+    pub texture: u64,
+    /// Left top and right bottom corner of the rectangle that is drawn, window pixels.
+    pub clip: [Vec2; 2],
+    /// Corners.
+    pub vertices: Vec<UiVertex>,
+    /// Three for each triangle.
+    pub indices: Vec<u32>,
+}
+
+/// A texture of a user interface.
+#[derive(Clone, Debug)]
+pub struct UiTexture {
+    /// Its number; a texture that has it is replaced.
+    pub id: u64,
+    /// Texels.
+    pub width: u32,
+    /// Texels.
+    pub height: u32,
+    /// `width * height * 4` bytes, display-encoded, multiplied by alpha, rows from the top.
+    pub rgba: Vec<u8>,
+}
+
+/// A frame of a user interface, drawn over the picture.
+#[derive(Clone, Debug, Default)]
+pub struct UiFrame {
+    /// New and changed textures.
+    pub textures: Vec<UiTexture>,
+    /// Numbers of textures that no later frame uses.
+    pub dropped: Vec<u64>,
+    /// Meshes in drawing order.
+    pub meshes: Vec<UiMesh>,
 }

@@ -8,7 +8,7 @@ use crate::assets::Assets;
 use crate::gpu::{self, ColorMask, Image, Recorder};
 use crate::raster::{
     Aids, DrawList, FlareTest, Flares, Overlay, PixelLights, Raster, StageContext, Statics, Target,
-    ViewParameters, overlay_instance, window_to_clip,
+    UiMeshes, ViewParameters, overlay_instance, window_to_clip,
 };
 use crate::scene::{ClassicScene, TracedScene, ViewScene};
 use crate::settings::Settings;
@@ -21,6 +21,8 @@ pub enum Item {
     Clear([f32; 4]),
     /// 2D pictures; shader time, seconds.
     Overlay(Overlay, f32),
+    /// A user interface.
+    Ui(UiMeshes),
     /// A 3D view in the classic look: at most one portal view, then the view itself.
     Classic(Vec<ClassicScene>),
     /// A 3D view in the traced look.
@@ -62,6 +64,7 @@ impl<'a> FrameContext<'a> {
         match item {
             Item::Clear(color) => self.clear(recorder, *color),
             Item::Overlay(overlay, time) => self.overlay(recorder, overlay, *time),
+            Item::Ui(meshes) => self.ui(recorder, meshes),
             Item::Classic(scenes) => scenes
                 .iter()
                 .try_for_each(|scene| self.classic(recorder, scene)),
@@ -143,6 +146,15 @@ impl<'a> FrameContext<'a> {
             .record(recorder, "overlay", target, self.list, &parameters)
     }
 
+    fn ui(&mut self, recorder: &mut Recorder, meshes: &UiMeshes) -> Result<(), gpu::Error> {
+        meshes.draw(self.list, self.stages());
+        let instances = [overlay_instance(0.0)];
+        let parameters = self.window_parameters(&instances);
+        let target = self.target();
+        self.raster
+            .record(recorder, "user interface", target, self.list, &parameters)
+    }
+
     /// View parameters of drawings in window pixels.
     fn window_parameters<'b>(&self, instances: &'b [Instance]) -> ViewParameters<'b> {
         let (width, height) = (self.color.width() as f32, self.color.height() as f32);
@@ -167,6 +179,7 @@ impl<'a> FrameContext<'a> {
             lights: &[],
             light_backs: true,
             viewport: [0, 0, width as i32, height as i32],
+            part: None,
             clear_depth: false,
             clear_color: None,
             shadows: None,
@@ -219,6 +232,7 @@ impl<'a> FrameContext<'a> {
             lights: &scene.dlights,
             light_backs: settings.dlight_backs,
             viewport: view.viewport,
+            part: scene.def.part,
             clear_depth: true,
             clear_color: clear_color(scene, settings),
             shadows: Some((&scene.look.shadows, view)),
@@ -267,6 +281,7 @@ impl<'a> FrameContext<'a> {
             lights: &[],
             light_backs: true,
             viewport: quads.view.viewport,
+            part: scene.def.part,
             clear_depth,
             clear_color: None,
             shadows: None,

@@ -32,10 +32,11 @@ pub use gpu::{
     CreateSurface, DeviceInfo, DeviceKind, Error as GpuError, RayTracingLimits, Window,
     WindowSource,
 };
-pub use renderer::{CpuTimes, FrameStats, Renderer, RendererOptions, probe};
+pub use renderer::{CpuTimes, FrameStats, Renderer, RendererOptions, map_options, probe};
 pub use settings::{
     Anaglyph, DebugOutput, DenoiserChoice, LightSelection, MapLightChoice, ModelShadows, Settings,
     TextureMode, TracerChoice,
 };
 pub use statistics::{Costs, MemoryPurpose, PassCost};
 pub use stereo::Eye;
+pub use world::LightsChanged;

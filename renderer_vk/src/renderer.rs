@@ -13,7 +13,7 @@ use std::time::Instant;
 
 use glam::Vec3;
 
-use crate::api::{DynamicLight, PolyVert, RefDef, RefEntity, rdflags};
+use crate::api::{DynamicLight, Look, PolyVert, RefDef, RefEntity, UiFrame, rdflags};
 use crate::assets::Assets;
 use crate::error::Error;
 use crate::frame::Item;
@@ -21,7 +21,7 @@ use crate::gpu::{
     ColorMask, Device, DeviceInfo, DeviceOptions, FrameRing, SurfaceSource, Swapchain,
     SwapchainDesc, Window, give_back_freed_memory,
 };
-use crate::raster::{DrawList, Flares, Overlay, Present, Raster};
+use crate::raster::{DrawList, Flares, Overlay, Present, Raster, UiTextures};
 use crate::scene::{GatherInput, Scene};
 use crate::settings::{Anaglyph, Settings};
 use crate::stereo::Eye;
@@ -29,7 +29,7 @@ use crate::targets::FrameTargets;
 use crate::trace::TraceLook;
 use crate::trace::pass_set::PassSet;
 use crate::trace::tracer::Tracer;
-use crate::world::{EntityTokens, Marker, World};
+use crate::world::{EntityTokens, Marker, World, WorldOptions};
 
 use held::HeldViews;
 use kept_pipelines::KeptPipelines;
@@ -85,11 +85,14 @@ pub struct Renderer {
     list: DrawList,
     raster: Raster,
     flares: Flares,
+    ui: UiTextures,
     present: Option<Present>,
     targets: FrameTargets,
     swapchain: Option<Swapchain>,
     ring: FrameRing,
     device: Device,
+    /// What the surface needs; dropped after the device.
+    _window: Option<Box<dyn std::any::Any>>,
     kept_pipelines: KeptPipelines,
 
     settings: Settings,
@@ -124,6 +127,11 @@ pub fn probe(device: Option<&str>) -> Result<DeviceInfo, Error> {
         .clone())
 }
 
+/// Options with which the renderer loads a map, for other loads of the same map.
+pub fn map_options(settings: &Settings) -> relight::Options<'static> {
+    WorldOptions::new(settings).relight()
+}
+
 impl Renderer {
     /// Makes the device, the swapchain if there is a window, and the frame's images. No game data is read.
     ///
@@ -148,8 +156,10 @@ impl Renderer {
             required_only,
             ..device_options(options.device.as_deref(), options.validation)
         };
+        let mut owner = None;
         let (device, swapchain) = match options.window {
-            Some(window) => {
+            Some(mut window) => {
+                owner = window.take_owner();
                 let device = window.source(|source| Device::new(&device_options, source))?;
                 let swapchain = Swapchain::new(
                     &device,
@@ -180,11 +190,13 @@ impl Renderer {
             list: DrawList::new(!device.info().software),
             raster: Raster::new(&device),
             flares: Flares::new(&device),
+            ui: UiTextures::default(),
             present,
             targets,
             swapchain,
             ring: FrameRing::new(&device, 2)?,
             device,
+            _window: owner,
             kept_pipelines,
             settings: Settings::default(),
             marker: Marker::default(),
@@ -314,7 +326,11 @@ impl Renderer {
             return Err(Error::NoWorld);
         }
         self.queue_overlay();
-        let traced = self.settings.rt && wants_world && self.ready_to_trace()?;
+        let wants_traced = match def.look {
+            Some(look) => look == Look::Traced,
+            None => self.settings.rt,
+        };
+        let traced = wants_traced && wants_world && self.ready_to_trace()?;
         let mask = self.eye.mask(self.settings.anaglyph);
         let pause = self.settings.rt_pause && traced;
         if pause && let Some(mut view) = self.held.next(def) {
@@ -354,6 +370,17 @@ impl Renderer {
         {
             view.look.debug.add(color, corners, view.view.origin);
         }
+    }
+
+    /// Queues a user interface, drawn over everything queued so far. Nothing is drawn before the first registration.
+    ///
+    /// # Errors
+    /// The device has no memory for a texture.
+    pub fn draw_ui(&mut self, frame: UiFrame) -> Result<(), Error> {
+        let meshes = self.ui.take(&self.device, frame)?;
+        self.queue_overlay();
+        self.queue.push((Item::Ui(meshes), ColorMask::ALL));
+        Ok(())
     }
 
     /// Sets the folder that caches light calibrations of maps, so that the traced look starts without calibrating

@@ -49,6 +49,7 @@ macro_rules! settings {
             reading: $reading,
             accumulation: $accumulation,
             put: |settings, given| settings.$field.put(given),
+            text: |settings| settings.$field.text(),
         } ),*];
 
         /// Defaults.
@@ -300,6 +301,24 @@ mod tests {
                 Ok(())
             );
             assert_eq!(settings, Settings::default(), "{}", row.spec.name);
+        }
+    }
+
+    #[test]
+    fn the_text_of_a_value_is_read_as_the_value() {
+        for row in ROWS {
+            let names = match row.spec.kind {
+                Kind::Name(names) => names.to_vec(),
+                _ => vec!["0", "1", "2", "0.5", "3"],
+            };
+            for value in names {
+                let mut settings = Settings::default();
+                assert_eq!(row.put(&mut settings, &Given::parse(value)), Ok(()));
+                let text = row.text(&settings);
+                let mut again = Settings::default();
+                assert_eq!(row.put(&mut again, &Given::parse(&text)), Ok(()));
+                assert_eq!(again, settings, "{} {value}: {text}", row.spec.name);
+            }
         }
     }
 

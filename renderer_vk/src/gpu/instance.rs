@@ -146,20 +146,25 @@ impl Instance {
     }
 }
 
+/// The system's Vulkan loader.
+///
+/// # Errors
+/// There is none.
+pub fn system_loader() -> Result<ash::Entry, Error> {
+    // SAFETY: opening the loader runs its initializers; the library is a Vulkan loader by its name.
+    unsafe { ash::Entry::load() }.map_err(|e| {
+        Error::Loader(format!(
+            "{e}; is a Vulkan driver with its loader installed?"
+        ))
+    })
+}
+
 /// The loader, the instance extensions of the window, and the function that makes its surface.
 fn load(
     source: SurfaceSource<'_>,
 ) -> Result<(ash::Entry, Vec<CString>, Option<CreateSurface<'_>>), Error> {
     match source {
-        SurfaceSource::Headless => {
-            // SAFETY: opening the loader runs its initializers; the library is a Vulkan loader by its name.
-            let entry = unsafe { ash::Entry::load() }.map_err(|e| {
-                Error::Loader(format!(
-                    "{e}; is a Vulkan driver with its loader installed?"
-                ))
-            })?;
-            Ok((entry, Vec::new(), None))
-        }
+        SurfaceSource::Headless => Ok((system_loader()?, Vec::new(), None)),
         SurfaceSource::Window(window) => {
             let functions = ash::StaticFn {
                 get_instance_proc_addr: window.get_instance_proc_addr,

@@ -21,6 +21,7 @@ mod shading;
 mod shadows;
 pub(crate) mod sky;
 mod target;
+mod ui;
 
 use std::collections::HashSet;
 
@@ -35,6 +36,7 @@ pub use overlay::{Overlay, Picture2d, overlay_instance};
 pub use present::Present;
 pub use shading::{PixelLights, StageContext};
 pub use target::Target;
+pub use ui::{UiMeshes, UiTextures};
 
 use crate::api::DynamicLight;
 use crate::gpu::{
@@ -86,6 +88,8 @@ pub struct ViewParameters<'a> {
     pub light_backs: bool,
     /// Left, top, width and height, pixels.
     pub viewport: [i32; 4],
+    /// The part of the viewport that is drawn, if not all of it.
+    pub part: Option<[i32; 4]>,
     /// Clears depth first (3D views; not the overlay).
     pub clear_depth: bool,
     /// Colour that clears the viewport first.
@@ -228,7 +232,7 @@ impl Raster {
             clear_color: None,
             clear_depth: None,
         };
-        let [x, y, width, height] = clip_to(p.viewport, target.color);
+        let [x, y, width, height] = clip_to(p.part.unwrap_or(p.viewport), target.color);
         if width == 0 || height == 0 {
             return Ok(());
         }

@@ -238,7 +238,7 @@ impl Overlay {
 }
 
 /// State of an opaque picture.
-const PLAIN: State = State {
+pub(super) const PLAIN: State = State {
     blend: None,
     depth: Depth::Always,
     depth_write: false,

@@ -107,7 +107,7 @@ impl Renderer {
                     overlay.clear();
                     self.spare_overlays.push(overlay);
                 }
-                Item::Clear(_) => {}
+                Item::Clear(_) | Item::Ui(_) => {}
                 Item::Classic(scenes) => self.scene.recycle_classic(scenes),
                 // held views are copies: keeping their memory would leak a copy per frame
                 Item::Traced(_) if self.settings.rt_pause => {}
@@ -180,7 +180,10 @@ impl Renderer {
                         stats.scene.add(&scene.look.statistics);
                     }
                 }
-                stats.views += u32::from(!matches!(item, Item::Overlay(..) | Item::Clear(_)));
+                stats.views += u32::from(!matches!(
+                    item,
+                    Item::Overlay(..) | Item::Clear(_) | Item::Ui(_)
+                ));
                 stats.draws += context.list.calls.len() as u32;
             }
         }

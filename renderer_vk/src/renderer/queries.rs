@@ -4,8 +4,10 @@ use glam::Vec3;
 
 use super::Renderer;
 use crate::api::{MarkFragment, Orientation, PointLighting};
+use crate::error::Error;
 use crate::statistics::Costs;
-use crate::world::{Marked, World};
+use crate::trace::TraceLook;
+use crate::world::{LightsChanged, Marked, World};
 
 impl Renderer {
     /// Light of the map's light grid at a point; `None` without a map or a light grid.
@@ -112,6 +114,40 @@ impl Renderer {
     /// The map, for tools.
     pub fn world(&self) -> Option<&World> {
         self.world.as_ref()
+    }
+
+    /// The lights of the map before hand-written ones changed them; `None` before the first traced view.
+    pub fn lights_before_hand(&mut self) -> Option<relight::light::ChangeableLights> {
+        self.world.as_mut()?.lights_before_hand()
+    }
+
+    /// Replaces the changes of the map's hand-written lights by others, and accumulation restarts. No effect before the
+    /// first traced view.
+    ///
+    /// # Errors
+    /// The device is out of memory or lost.
+    pub fn light_by_hand(
+        &mut self,
+        by_hand: &relight::light::LightsByHand,
+    ) -> Result<LightsChanged, Error> {
+        let (Some(world), Some(assets)) = (&mut self.world, &mut self.assets) else {
+            return Ok(LightsChanged::default());
+        };
+        let changed = world.light_by_hand(by_hand, assets);
+        if let Some(trace) = &mut self.trace {
+            trace.change_lights(world)?;
+        }
+        Ok(changed)
+    }
+
+    /// Number of frames in the mean of `rt_accumulate`; 0 without a traced view.
+    pub fn accumulated_frames(&self) -> u32 {
+        (self.trace.as_ref()).map_or(0, TraceLook::accumulated_frames)
+    }
+
+    /// Whether the traced look is ready: its lights are found and its pipelines compiled.
+    pub fn is_ready_to_trace(&self) -> bool {
+        self.trace.is_some()
     }
 
     /// The `videoMap` files of registered materials, with the client numbers for

@@ -100,6 +100,7 @@ impl Renderer {
             lights: &[DynamicLight::default()],
             light_backs: true,
             viewport: [0, 0, 1, 1],
+            part: None,
             clear_depth: true,
             clear_color: None,
             shadows: None,

@@ -165,6 +165,7 @@ pub struct Row {
     /// Whether a change restarts accumulation.
     pub accumulation: Accumulation,
     pub(super) put: fn(&mut Settings, &Given<'_>) -> bool,
+    pub(super) text: fn(&Settings) -> String,
 }
 
 /// A text that is no value of a setting.
@@ -186,6 +187,11 @@ impl Row {
             true => Ok(()),
             false => Err(self.spec.refused(given.text)),
         }
+    }
+
+    /// The current value as text, which [`put`](Self::put) accepts.
+    pub fn text(&self, settings: &Settings) -> String {
+        (self.text)(settings)
     }
 
     /// Puts the default back.

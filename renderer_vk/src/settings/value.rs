@@ -44,6 +44,8 @@ pub(super) trait Value: Copy + Default {
     fn of(given: &Given<'_>) -> Option<Self>;
     /// Distinct for distinct values.
     fn bits(self) -> u32;
+    /// The value as text of its variable.
+    fn text(self) -> String;
 
     /// The value of a row's default, which a test reads.
     fn default_of(text: &str) -> Self {
@@ -68,6 +70,9 @@ impl Value for bool {
     fn bits(self) -> u32 {
         self.into()
     }
+    fn text(self) -> String {
+        u32::from(self).to_string()
+    }
 }
 
 /// Negative numbers are 0.
@@ -79,6 +84,9 @@ impl Value for u32 {
     fn bits(self) -> u32 {
         self
     }
+    fn text(self) -> String {
+        self.to_string()
+    }
 }
 
 impl Value for i32 {
@@ -89,6 +97,9 @@ impl Value for i32 {
     fn bits(self) -> u32 {
         self.cast_unsigned()
     }
+    fn text(self) -> String {
+        self.to_string()
+    }
 }
 
 impl Value for f32 {
@@ -98,6 +109,9 @@ impl Value for f32 {
     }
     fn bits(self) -> u32 {
         self.to_bits()
+    }
+    fn text(self) -> String {
+        self.to_string()
     }
 }
 
@@ -122,6 +136,9 @@ macro_rules! numbered {
             }
             fn bits(self) -> u32 {
                 self as u32
+            }
+            fn text(self) -> String {
+                self.bits().to_string()
             }
         }
     };
@@ -150,6 +167,9 @@ macro_rules! named {
             }
             fn bits(self) -> u32 {
                 self as u32
+            }
+            fn text(self) -> String {
+                self.name().to_owned()
             }
         }
     };

@@ -116,6 +116,30 @@ fn geometry(
     Ok(geometry)
 }
 
+/// Calls `with` with the lights of a map.
+fn with_lights<T>(
+    world: &World,
+    with: impl FnOnce(&MapLightSource<'_>) -> Result<T, Error>,
+) -> Result<T, Error> {
+    let relit = &world.data.relit;
+    let model_origins: Vec<_> = relit.models.iter().map(|m| m.origin).collect();
+    let flickers: Vec<_> = relit.lights.iter().map(|l| relit.flicker_of(l)).collect();
+    let occlusion = Occlusion::new(relit);
+    let source = MapLightSource {
+        triangles: &relit.lights,
+        points: &relit.point_lights,
+        suns: &relit.suns,
+        lists: &relit.light_lists,
+        flickers: &flickers,
+        model_origins: &model_origins,
+        ambient: relit.ambient,
+        light_cutoff: relit.light_cutoff,
+        bsp: Some(&relit.bsp),
+        occlusion: Some(&occlusion),
+    };
+    with(&source)
+}
+
 /// A view of the loaded map, with its inputs and target.
 #[derive(Clone, Copy)]
 pub struct MapView<'a> {
@@ -155,30 +179,16 @@ impl TraceLook {
     /// # Errors
     /// The device is out of memory or lost.
     pub fn new(passes: &Arc<PassSet>, world: &World, assets: &Assets) -> Result<Self, Error> {
-        let relit = &world.data.relit;
-        let model_origins: Vec<_> = relit.models.iter().map(|m| m.origin).collect();
-        let flickers: Vec<_> = relit.lights.iter().map(|l| relit.flicker_of(l)).collect();
-        let occlusion = Occlusion::new(relit);
-        let source = MapLightSource {
-            triangles: &relit.lights,
-            points: &relit.point_lights,
-            suns: &relit.suns,
-            lists: &relit.light_lists,
-            flickers: &flickers,
-            model_origins: &model_origins,
-            ambient: relit.ambient,
-            light_cutoff: relit.light_cutoff,
-            bsp: Some(&relit.bsp),
-            occlusion: Some(&occlusion),
-        };
-        passes.compile_ahead(!relit.bsp.fogs.is_empty())?;
+        passes.compile_ahead(!world.data.relit.bsp.fogs.is_empty())?;
         let (device, tracer) = (passes.device(), passes.tracer());
         let mut view_tracer = ViewTracer::new(passes)?;
-        let exposure = relit.display_exposure();
+        let exposure = world.data.relit.display_exposure();
         view_tracer.map_exposure = exposure;
-        let fogs = fog_light::lit(&world.data.fogs, &source);
+        let (fogs, mut lights) = with_lights(world, |source| {
+            let fogs = fog_light::lit(&world.data.fogs, source);
+            Ok((fogs, MapLights::new(device, source)?))
+        })?;
         let geometry = geometry(device, tracer, world, &fogs, assets)?;
-        let mut lights = MapLights::new(device, &source)?;
         lights.white = exposure.scale.recip();
         lights.find_fogs(&geometry.fog_boxes);
         Ok(Self {
@@ -190,6 +200,25 @@ impl TraceLook {
             lights,
             remapping: remapping(&assets.materials),
         })
+    }
+
+    /// Takes over the lights of a world whose lights have changed. The light of its fogs stays.
+    ///
+    /// # Errors
+    /// The device is out of memory or lost.
+    pub fn change_lights(&mut self, world: &World) -> Result<(), Error> {
+        let device = self.passes.device();
+        let mut lights = with_lights(world, |source| MapLights::new(device, source))?;
+        lights.white = self.lights.white;
+        lights.find_fogs(&self.geometry.fog_boxes);
+        self.lights = lights;
+        self.tracer.forget_accumulated();
+        Ok(())
+    }
+
+    /// Number of frames in the mean of `rt_accumulate`.
+    pub fn accumulated_frames(&self) -> u32 {
+        self.tracer.accumulated_frames()
     }
 
     /// Records all passes of a view into its rectangle of the target, and tests the visibility of its flares.

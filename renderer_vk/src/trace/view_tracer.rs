@@ -149,6 +149,11 @@ impl ViewTracer {
         self.counters.rays()
     }
 
+    /// Discards accumulated frames.
+    pub fn forget_accumulated(&mut self) {
+        self.accumulated = (0, 0);
+    }
+
     /// Discards accumulated frames and restarts exposure, after a change of map.
     #[cfg(test)]
     pub fn reset(&mut self) {

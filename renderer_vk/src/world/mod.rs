@@ -203,6 +203,8 @@ pub struct World {
     pub fog_buffer: Buffer,
     /// Light of the map for the traced look; `None` before the first traced view.
     lit: Option<Lit>,
+    /// The current light before hand-written lights changed it.
+    before_hand: Option<relight::world::Lighting>,
 }
 
 /// The current light of a map, and the alternative one.
@@ -211,6 +213,15 @@ struct Lit {
     other: relight::world::Lighting,
     /// The alternative light is computed; otherwise it is the map's initial light.
     found: bool,
+}
+
+/// Time and result of a change of a map's lights.
+#[derive(Clone, Debug, Default)]
+pub struct LightsChanged {
+    /// Materials of the change that the map does not have.
+    pub unknown: Vec<String>,
+    /// Duration, seconds.
+    pub seconds: f64,
 }
 
 impl std::ops::Deref for World {
@@ -277,6 +288,7 @@ impl World {
             fog_buffer: Buffer::with_data(device, "fogs", BufferUsage::STORAGE, &data.fogs)?,
             data,
             lit: None,
+            before_hand: None,
         })
     }
 
@@ -346,6 +358,7 @@ impl World {
                 report.seconds
             );
         }
+        self.before_hand = Some(relit.lighting());
         relit.light_by_hand(&*files);
         let swept = relight::light::sweep(relit, cache);
         for warning in relit.warnings.iter().skip(warned) {
@@ -364,6 +377,37 @@ impl World {
             swept.entries[0]
         );
         self.mark_emitters(assets);
+    }
+
+    /// The lights before hand-written ones changed them; `None` before the first traced view.
+    pub fn lights_before_hand(&mut self) -> Option<relight::light::ChangeableLights> {
+        let now = self.data.relit.lighting();
+        self.data.relit.set_lighting(self.before_hand.clone()?);
+        let lights = relight::light::ChangeableLights::of(&self.data.relit);
+        self.data.relit.set_lighting(now);
+        Some(lights)
+    }
+
+    /// Replaces the changes of hand-written lights by others, and sweeps the light lists. No effect before the first
+    /// traced view.
+    pub(crate) fn light_by_hand(
+        &mut self,
+        by_hand: &relight::light::LightsByHand,
+        assets: &mut Assets,
+    ) -> LightsChanged {
+        let begin = std::time::Instant::now();
+        let Some(before) = &self.before_hand else {
+            return LightsChanged::default();
+        };
+        let relit = &mut self.data.relit;
+        relit.set_lighting(before.clone());
+        let unknown = by_hand.apply(relit);
+        relight::light::sweep(relit, None);
+        self.mark_emitters(assets);
+        LightsChanged {
+            unknown,
+            seconds: begin.elapsed().as_secs_f64(),
+        }
     }
 
     /// Marks the materials that are in the light lists.
