@@ -6,7 +6,9 @@ use anyhow::Result;
 use clap::{Parser, Subcommand};
 
 use crate::outcome::parse;
-use crate::{calibration, cameras, compare, convert, info, lights, material, render, report};
+use crate::{
+    calibration, cameras, compare, convert, info, lights, material, render, report, viewer,
+};
 
 /// Maps of id Tech 3 games: contents, conversion, pictures with new light
 #[derive(Parser, Debug)]
@@ -28,6 +30,7 @@ enum Command {
     Material(material::MaterialArgs),
     Render(Box<render::RenderArgs>),
     Report(report::ReportArgs),
+    View(Box<viewer::ViewArgs>),
 }
 
 /// Names of earlier versions: subcommand, option (empty for the subcommand itself), replacement.
@@ -62,6 +65,7 @@ pub fn run() -> Result<ExitCode> {
         Command::Material(args) => return material::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Report(args) => report::run(&args),
+        Command::View(args) => viewer::run(&args),
     }?;
     Ok(ExitCode::SUCCESS)
 }

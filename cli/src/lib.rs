@@ -30,6 +30,7 @@ mod settings;
 mod table;
 mod timings;
 mod view;
+mod viewer;
 
 use std::process::ExitCode;
 

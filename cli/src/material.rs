@@ -1,5 +1,6 @@
 //! `relight material`: interpretation of a material.
 
+use std::fmt;
 use std::process::ExitCode;
 use std::sync::Arc;
 
@@ -156,12 +157,17 @@ pub fn run(args: &MaterialArgs) -> Result<ExitCode> {
     if args.json {
         println!("{}", serde_json::to_string_pretty(&reports)?);
     } else {
-        reports.iter().for_each(Report::print);
+        reports.iter().for_each(|report| print!("{report}"));
     }
     Ok(match faults {
         0 => ExitCode::SUCCESS,
         _ => ExitCode::FAILURE,
     })
+}
+
+/// The report about one material, as text. `all`: diagnostics of all scripts.
+pub fn describe(files: &dyn GameFiles, material: &WorldMaterial, all: &[Diagnostic]) -> String {
+    Report::new(files, material, all).to_string()
 }
 
 /// Materials of a map with a name, or whose image has it: one for each set of flags and kind of lighting.
@@ -223,71 +229,81 @@ impl Report {
             source: source(files, material),
         }
     }
+}
 
-    fn print(&self) {
+/// The text for people.
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let text = |value: &Value| match value {
             Value::String(text) => text.clone(),
             other => other.to_string(),
         };
         let empty = serde_json::Map::new();
         let material = self.material.as_object().unwrap_or(&empty);
-        println!("{}", text(&self.material["name"]));
-        let row = |name: &str, value: String| println!("  {name:12} {value}");
+        writeln!(f, "{}", text(&self.material["name"]))?;
         match material.get("script") {
-            Some(script) => row("defined in", text(script)),
-            None => row("defined by", "no script; a bare image".to_owned()),
+            Some(script) => row(f, "defined in", &text(script))?,
+            None => row(f, "defined by", "no script; a bare image")?,
         }
         if let Some(fault) = material.get("fault") {
-            row("not drawn", format!("{}; default instead", text(fault)));
+            row(f, "not drawn", &format!("{}; default instead", text(fault)))?;
         }
-        row("kind", self.light.words());
+        row(f, "kind", &self.light.words())?;
         let [r, g, b] = self.light.albedo;
-        row("albedo", format!("{r:.3} {g:.3} {b:.3}"));
+        row(f, "albedo", &format!("{r:.3} {g:.3} {b:.3}"))?;
         match &self.light.emission {
             Some(e) => {
                 let [r, g, b] = e.strength;
                 let sides = if e.two_sided { ", both sides" } else { "" };
                 let time = if e.flickers { ", changing in time" } else { "" };
-                row(
-                    "emits",
-                    format!("{r:.3} {g:.3} {b:.3} by {}{sides}{time}", e.source),
-                );
+                let emits = format!("{r:.3} {g:.3} {b:.3} by {}{sides}{time}", e.source);
+                row(f, "emits", &emits)?;
             }
-            None => row("emits", "nothing".to_owned()),
+            None => row(f, "emits", "nothing")?,
         }
         for (key, value) in material {
             if !matches!(
                 key.as_str(),
                 "name" | "script" | "fault" | "stages" | "class"
             ) {
-                row(key, text(value));
+                row(f, key, &text(value))?;
             }
         }
         let stages = self.material["stages"]
             .as_array()
             .map_or(&[][..], Vec::as_slice);
-        row("stages", stages.len().to_string());
+        row(f, "stages", &stages.len().to_string())?;
         for (at, stage) in stages.iter().enumerate() {
             let fields = stage.as_object().into_iter().flatten();
             let fields: Vec<String> = fields.map(|(k, v)| format!("{k} {}", text(v))).collect();
-            println!("    {}  {}", at + 1, fields.join(", "));
+            writeln!(f, "    {}  {}", at + 1, fields.join(", "))?;
         }
-        row("warnings", self.warnings.len().to_string());
+        row(f, "warnings", &self.warnings.len().to_string())?;
         for w in &self.warnings {
-            println!("    {}:{}: {}: {}", w.place, w.line, w.severity, w.message);
+            writeln!(
+                f,
+                "    {}:{}: {}: {}",
+                w.place, w.line, w.severity, w.message
+            )?;
             if let Some(line) = self.source.iter().find(|line| line.number == w.line) {
-                println!("        {}", line.text.trim());
+                writeln!(f, "        {}", line.text.trim())?;
             }
         }
         if !self.source.is_empty() {
-            row("source", String::new());
+            row(f, "source", "")?;
         }
         for line in &self.source {
             let warned = self.warnings.iter().any(|w| w.line == line.number);
             let mark = if warned { '>' } else { ' ' };
-            println!("  {mark} {:5}  {}", line.number, line.text);
+            writeln!(f, "  {mark} {:5}  {}", line.number, line.text)?;
         }
+        Ok(())
     }
+}
+
+/// A line of the report.
+fn row(f: &mut fmt::Formatter<'_>, name: &str, value: &str) -> fmt::Result {
+    writeln!(f, "  {name:12} {value}")
 }
 
 impl Light {

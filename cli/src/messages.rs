@@ -42,7 +42,9 @@ impl Log for Messages {
     fn log(&self, record: &Record<'_>) {
         let message = record.args().to_string();
         let new = self.enabled(record.metadata()) && self.is_new(&message);
-        if new && record.level() <= Level::Warn {
+        // the window library warns about the display's properties, which a user cannot change
+        let ours = !record.target().starts_with("winit");
+        if new && ours && record.level() <= Level::Warn {
             eprintln!("{message}");
         }
     }

@@ -1,0 +1,129 @@
+//! `relight view`: a window with a map.
+
+mod app;
+mod lights;
+mod motion;
+mod panels;
+mod picked;
+mod source;
+mod state;
+#[cfg(test)]
+mod tests;
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+
+use crate::game::Game;
+use crate::pictures::check_name;
+use crate::render::{parse_size, parse_view};
+use crate::settings::SettingArgs;
+use crate::view::Camera;
+use state::{Shown, Start};
+
+/// Show a map in a window: fly and walk through it, compare looks, change settings and lights
+///
+/// Needs no engine. W A S D move, Q and E go down and up, Shift is faster, the mouse turns while a button is held, a
+/// click names the surface; 1 to 4 switch the look, G walks, H hides the panel. The window reloads the map when its
+/// files change.
+///
+/// Examples: relight view oa_dm1; relight view my.bsp --look split; relight view --sample
+#[derive(Args, Debug)]
+pub struct ViewArgs {
+    /// The map: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp file, a pack (.pk3) with one map, or pack.pk3:maps/x.bsp
+    #[arg(required_unless_present = "sample", value_name = "MAP")]
+    map: Option<String>,
+    /// Show the built-in sample map
+    #[arg(long, conflicts_with = "map")]
+    sample: bool,
+    #[command(flatten)]
+    game: Game,
+    /// What is shown at first
+    #[arg(long = "look", value_enum, default_value = "traced", id = "shown")]
+    look: Shown,
+    /// Size in pixels
+    #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1280x720", value_parser = parse_size)]
+    size: (u32, u32),
+    /// Camera: position in units, yaw and pitch (down) in degrees, which may be left out; default: the map's
+    /// intermission or first spawn point
+    #[arg(long, value_parser = parse_view, allow_hyphen_values = true, value_name = "X,Y,Z,YAW,PITCH")]
+    view: Option<Camera>,
+    /// View from a spawn point, counted from 0 in the map's order
+    #[arg(long, value_name = "N", conflicts_with = "view")]
+    spawn: Option<usize>,
+    /// File of lights that is read and saved in place of the one beside the map
+    #[arg(long, value_name = "FILE")]
+    lights: Option<PathBuf>,
+    /// Cache calibrations, swept light lists and pipelines in this folder; default: the user's cache folder
+    #[arg(long, value_name = "DIR")]
+    cache: Option<PathBuf>,
+    /// Vulkan device: part of its name
+    #[arg(long, value_name = "NAME")]
+    device: Option<String>,
+    /// Enable Vulkan's validation layer; any message is an error
+    #[arg(long)]
+    validate: bool,
+    /// Write what the window shows, panel included, once the look is ready, and end (PNG, or JPEG by the ending .jpg)
+    #[arg(long, value_name = "PATH")]
+    screenshot: Option<PathBuf>,
+    #[command(flatten)]
+    set: SettingArgs,
+}
+
+/// The user's cache folder of this program; `None` if the environment names none.
+fn cache_folder() -> Option<PathBuf> {
+    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
+    let folder = if cfg!(windows) {
+        PathBuf::from(set("LOCALAPPDATA")?)
+    } else {
+        match set("XDG_CACHE_HOME") {
+            Some(folder) => PathBuf::from(folder),
+            None => PathBuf::from(set("HOME")?).join(".cache"),
+        }
+    };
+    Some(folder.join("relight"))
+}
+
+/// Runs the command.
+pub fn run(args: &ViewArgs) -> Result<()> {
+    if let Some(path) = &args.screenshot {
+        check_name(path)?;
+    }
+    let cache = args.cache.clone().or_else(cache_folder);
+    let cache = cache.context(
+        "no folder for cached lights: neither XDG_CACHE_HOME nor HOME is set; name one with --cache DIR",
+    )?;
+    let source = source::Source {
+        map: args.map.clone(),
+        games: match args.sample {
+            true => Vec::new(),
+            false => args.game.paths.clone(),
+        },
+        lights: args.lights.clone(),
+    };
+    // errors of the map are reported before a window appears
+    source.open()?;
+    let start = Start {
+        source,
+        cache,
+        shown: args.look,
+        settings: args.set.change([], renderer_vk::Settings::full_size()),
+        camera: args.view,
+        spawn: args.spawn,
+    };
+    let options = app::WindowOptions {
+        size: args.size,
+        device: args.device.clone(),
+        validation: args.validate,
+        screenshot: args.screenshot.clone(),
+    };
+    let messages = app::run(start, options)?;
+    match messages.first() {
+        Some(first) if args.validate => bail!(
+            "the validation layer has {} messages, the first: {first}",
+            messages.len()
+        ),
+        _ => Ok(()),
+    }
+}

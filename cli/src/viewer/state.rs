@@ -1,0 +1,610 @@
+//! What the viewer shows and does, independent of the window system: a frame of input in, a picture out.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result};
+use clap::ValueEnum;
+use glam::{UVec2, Vec2};
+use gui::egui::{self, PlatformOutput, RawInput};
+use gui::{Change, CostHistory, Gui};
+use relight::light::ChangeableLights;
+use relight::probe::Probe;
+use relight::{CalibrationCache, GameFiles};
+use renderer_vk::api::{Look, Picture, RefDef, RefEntity};
+use renderer_vk::settings::{Given, Preset, flags, row};
+use renderer_vk::{Renderer, Settings};
+use shaderscript::Diagnostic;
+
+use super::lights::{Editor, Screen, lights_path};
+use super::motion::Motion;
+use super::picked::Picked;
+use super::source::{Changed, Changes, Finder, Progress, Source};
+use crate::scripts::load_scripts;
+use crate::view::{self, Camera};
+
+/// What the window shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Shown {
+    /// As the engine's own renderer draws it.
+    Classic,
+    /// Ray traced in real time, denoised.
+    Traced,
+    /// The classic look on the left, the traced look on the right of an edge that can be moved.
+    Split,
+    /// Ray traced, the mean of all frames since the camera moved.
+    Reference,
+}
+
+/// Options of a viewer.
+pub struct Start {
+    /// The map.
+    pub source: Source,
+    /// Folder of cached results.
+    pub cache: PathBuf,
+    /// What is shown first.
+    pub shown: Shown,
+    /// Settings at the start.
+    pub settings: Settings,
+    /// The first camera.
+    pub camera: Option<Camera>,
+    /// Spawn point of the first camera.
+    pub spawn: Option<usize>,
+}
+
+/// Wakes the window's loop from another thread.
+pub type Wake = Arc<dyn Fn() + Send + Sync>;
+
+/// Result of a frame.
+pub struct Frame {
+    /// What egui requests of the window.
+    pub output: PlatformOutput,
+    /// The next frame would be the same, unless something happens.
+    pub at_rest: bool,
+}
+
+/// The loaded map.
+pub struct Map {
+    /// Its game path.
+    pub name: String,
+    pub files: Arc<dyn GameFiles>,
+    pub diagnostics: Vec<Diagnostic>,
+    pub entities: Vec<RefEntity>,
+    /// Cameras by name.
+    pub cameras: Vec<(String, Camera)>,
+    /// Made at the first use.
+    pub probe: Option<Probe>,
+}
+
+/// Steps of the start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    /// A picture with a message is shown next.
+    Opens,
+    /// The map is loaded in the next frame.
+    Loads,
+    /// A map is shown.
+    Shows,
+}
+
+/// The viewer.
+pub struct Viewer {
+    pub(super) renderer: Renderer,
+    pub(super) gui: Gui,
+    pub(super) source: Source,
+    cache: PathBuf,
+    wake: Wake,
+    stage: Stage,
+    pub(super) shown: Shown,
+    pub(super) settings: Settings,
+    pub(super) motion: Motion,
+    camera: Option<Camera>,
+    spawn: Option<usize>,
+    pub(super) map: Option<Map>,
+    pub(super) finder: Option<Finder>,
+    /// The lights of the map are known to the renderer.
+    found: bool,
+    changes: Changes,
+    pub(super) editor: Option<Editor>,
+    pub(super) lights_path: Option<PathBuf>,
+    pub(super) picked: Option<Picked>,
+    pub(super) costs: CostHistory,
+    /// Mean time of a frame, seconds.
+    pub(super) frame_seconds: f32,
+    /// CPU time of the panels in the newest frame, milliseconds.
+    pub(super) panel_ms: f32,
+    /// Result of the newest action.
+    pub(super) message: Option<String>,
+    pub(super) panel: bool,
+    pub(super) animates: bool,
+    pub(super) filter: String,
+    /// Place of the edge of the split screen, part of the view's width.
+    pub(super) split: f32,
+    /// Frames of a reference.
+    pub(super) wanted_frames: u32,
+    pub(super) dragged: Option<super::panels::Handle>,
+    time: f32,
+    /// Rectangle of the view in the newest frame, points.
+    pub(super) view_rect: egui::Rect,
+    /// Frames shown since the look is complete.
+    complete_frames: u32,
+    title: Option<String>,
+    opened: Instant,
+    /// Seconds from the start to the first picture of the map.
+    pub(super) first_picture: Option<f32>,
+}
+
+/// Frames after which a denoised picture is calm enough for a screenshot.
+const CALM: u32 = 16;
+
+impl Viewer {
+    /// A viewer whose map is loaded in its first frames.
+    ///
+    /// # Errors
+    /// The device is out of memory.
+    pub fn new(
+        mut renderer: Renderer,
+        start: Start,
+        wake: Box<dyn Fn() + Send + Sync>,
+    ) -> Result<Self> {
+        let wake: Wake = Arc::from(wake);
+        let mut settings = start.settings;
+        if renderer.device_info().software && settings == Settings::full_size() {
+            // a processor traces a picture of full size in seconds
+            if let Some(low) = Preset::of("low") {
+                low.put(&mut settings)?;
+            }
+        }
+        renderer.keep_calibrations(Some(start.cache.clone()));
+        // the built-in materials draw the panels until the map is loaded
+        let none = Arc::new(relight::MemoryFiles::new());
+        renderer.begin_registration(none, &settings)?;
+        let woken = Arc::clone(&wake);
+        let changes = Changes::watch(&start.source, move || woken());
+        Ok(Self {
+            renderer,
+            gui: Gui::new(),
+            source: start.source,
+            cache: start.cache,
+            wake,
+            stage: Stage::Opens,
+            shown: start.shown,
+            settings,
+            motion: Motion::new(Camera::default()),
+            camera: start.camera,
+            spawn: start.spawn,
+            map: None,
+            finder: None,
+            found: false,
+            changes,
+            editor: None,
+            lights_path: None,
+            picked: None,
+            costs: CostHistory::default(),
+            frame_seconds: 0.0,
+            panel_ms: 0.0,
+            message: None,
+            panel: true,
+            animates: true,
+            filter: String::new(),
+            split: 0.5,
+            wanted_frames: 1024,
+            dragged: None,
+            time: 0.0,
+            view_rect: egui::Rect::NOTHING,
+            complete_frames: 0,
+            title: None,
+            opened: Instant::now(),
+            first_picture: None,
+        })
+    }
+
+    /// egui's state, for the window's events.
+    pub fn context(&self) -> &egui::Context {
+        self.gui.context()
+    }
+
+    /// A new title of the window.
+    pub fn take_title(&mut self) -> Option<String> {
+        self.title.take()
+    }
+
+    /// Changes the size of the picture, pixels; 0 while the window is minimised.
+    ///
+    /// # Errors
+    /// The device is out of memory.
+    pub fn resize(&mut self, width: u32, height: u32) -> Result<()> {
+        self.renderer.set_hidden(width == 0 || height == 0);
+        if width > 0 && height > 0 {
+            self.renderer.resize(width, height)?;
+        }
+        Ok(())
+    }
+
+    /// Whether the picture is what was requested: the look is complete, and calm or averaged.
+    pub fn is_ready(&self) -> bool {
+        let calm = match self.shown {
+            Shown::Classic => 2,
+            Shown::Traced | Shown::Split => CALM,
+            Shown::Reference => self.wanted_frames,
+        };
+        self.complete_frames >= calm
+    }
+
+    /// What the window shows.
+    ///
+    /// # Errors
+    /// The device is lost or out of memory.
+    pub fn picture(&mut self) -> Result<Picture> {
+        Ok(self.renderer.read_pixels()?)
+    }
+
+    /// Ends; returns the messages of the validation layer.
+    pub fn end(self) -> Vec<String> {
+        self.renderer.validation_messages()
+    }
+
+    /// Runs a frame: input, motion, panels, picture.
+    ///
+    /// # Errors
+    /// The map cannot be read at the start, or the device is lost or out of memory.
+    pub fn frame(&mut self, input: RawInput, passed: Duration) -> Result<Frame> {
+        match self.stage {
+            Stage::Opens => self.stage = Stage::Loads,
+            Stage::Loads => {
+                self.load()?;
+                self.stage = Stage::Shows;
+            }
+            Stage::Shows => {}
+        }
+        let seconds = passed.as_secs_f32();
+        self.frame_seconds += (seconds - self.frame_seconds) * 0.1;
+        let collecting = self.follow_files();
+        self.follow_finder();
+        let begin = Instant::now();
+        let mut changes = Vec::new();
+        let mut gui = std::mem::take(&mut self.gui);
+        let (ui, output) = gui.run(input, |context| {
+            changes.clear();
+            self.panels(context, &mut changes);
+        });
+        self.gui = gui;
+        self.panel_ms = begin.elapsed().as_secs_f32() * 1000.0;
+        self.change(&changes)?;
+        let moved = self.advance(seconds);
+        self.draw(ui)?;
+        let wants = self.gui.context().has_requested_repaint();
+        let rests = self.is_ready() && (!self.animates || self.shown == Shown::Reference);
+        Ok(Frame {
+            output,
+            at_rest: rests && !moved && !collecting && !wants && changes.is_empty(),
+        })
+    }
+
+    /// Whether the traced look can be shown.
+    pub(super) fn can_trace(&self) -> bool {
+        self.found
+    }
+
+    fn load(&mut self) -> Result<()> {
+        let (files, name) = self.source.open()?;
+        let (_, diagnostics) = load_scripts(&*files);
+        let loaded = view::load(
+            &mut self.renderer,
+            Arc::clone(&files),
+            &name,
+            &self.settings,
+        );
+        let (bsp, entities) = loaded?;
+        let mut cameras = Vec::new();
+        if let Some(camera) = Camera::of_map(&bsp) {
+            cameras.push(("intermission".to_owned(), camera));
+        }
+        let spawns = Camera::spawns(&bsp);
+        cameras.extend(
+            (0..)
+                .zip(&spawns)
+                .map(|(n, camera)| (format!("spawn {n}"), *camera)),
+        );
+        if let Some(number) = self.spawn.take() {
+            let spawn = spawns.get(number).copied();
+            let count = spawns.len();
+            self.camera = Some(spawn.with_context(|| {
+                format!("no spawn point {number}: the map has {count}, counted from 0")
+            })?);
+        }
+        let relit = &self.renderer.world().context("no map")?.relit;
+        let overview = Camera::overview(relit, self.renderer.size(), FOV);
+        if let Some(camera) = overview {
+            cameras.push(("overview".to_owned(), camera));
+        }
+        let kept = self.map.is_some().then_some(self.motion.camera);
+        let first = cameras.first().map(|(_, camera)| *camera);
+        self.motion.camera = kept.or(self.camera.take()).or(first).unwrap_or_default();
+        let given = self.source.map.clone().unwrap_or_default();
+        self.lights_path = lights_path(
+            self.source.lights.as_ref(),
+            &given,
+            &name,
+            &self.source.games,
+        );
+        self.title = Some(format!("{} – Relight", view::map_name(&name)));
+        self.map = Some(Map {
+            name,
+            files,
+            diagnostics,
+            entities,
+            cameras,
+            probe: None,
+        });
+        self.picked = None;
+        self.editor = None;
+        self.found = false;
+        self.finder = None;
+        Ok(())
+    }
+
+    /// Loads the map again after a change; the picture before stays if that fails.
+    fn reload(&mut self) {
+        match self.load() {
+            Ok(()) => self.message = Some("reloaded: files have changed".to_owned()),
+            Err(e) => self.message = Some(format!("not reloaded: {e:#}")),
+        }
+    }
+
+    /// Begins the search for lights, or takes over its result.
+    fn follow_finder(&mut self) {
+        if self.map.is_none() || self.found || self.shown == Shown::Classic {
+            return;
+        }
+        let finder = self.finder.get_or_insert_with(|| {
+            let wake = Arc::clone(&self.wake);
+            Finder::begin(
+                self.source.clone(),
+                CalibrationCache::new(&self.cache),
+                self.settings.clone(),
+                move || wake(),
+            )
+        });
+        match finder.update() {
+            Progress::Part(_) => {}
+            Progress::Found => self.found = true,
+            Progress::Failed(why) => {
+                // the renderer then searches by itself
+                self.message = Some(why.clone());
+                self.found = true;
+            }
+        }
+    }
+
+    /// Reloads what has changed on disk; whether changes are being collected.
+    fn follow_files(&mut self) -> bool {
+        let (changed, collecting) = self.changes.take();
+        let own = self.editor.as_ref().is_some_and(Editor::is_changed);
+        match changed {
+            None => {}
+            Some(Changed::Lights) if own => {
+                self.message =
+                    Some("the file of lights has changed on disk; yours are not saved".to_owned());
+            }
+            Some(Changed::Lights) => self.reload_lights(),
+            Some(Changed::Map) => self.reload(),
+        }
+        collecting
+    }
+
+    /// Reads the lights by hand again.
+    fn reload_lights(&mut self) {
+        let read = || -> Result<_> {
+            let (files, name) = self.source.open()?;
+            let stem = name.strip_suffix(".bsp").unwrap_or(&name).to_owned();
+            let path = format!("{stem}.lights");
+            let bytes = files.read(&path)?.unwrap_or_default();
+            let text = String::from_utf8_lossy(&bytes).into_owned();
+            Ok((relight::light::LightsByHand::parse(&text), path))
+        };
+        match read() {
+            Ok(((file, wrong), path)) => {
+                let same = (self.editor.as_ref()).is_some_and(|editor| editor.file() == file);
+                if same {
+                    return; // saved here
+                }
+                let changed = self.renderer.light_by_hand(&file);
+                self.editor = None;
+                self.message = Some(match (changed, wrong.first()) {
+                    (Err(e), _) => e.to_string(),
+                    (Ok(_), Some(wrong)) => format!("{path}: {wrong}"),
+                    (Ok(changed), None) => match changed.unknown.first() {
+                        Some(name) => format!("{path}: material {name} is not in the map"),
+                        None => "lights reloaded".to_owned(),
+                    },
+                });
+            }
+            Err(e) => self.message = Some(format!("{e:#}")),
+        }
+    }
+
+    /// The list of lights, once they are found and traced.
+    pub(super) fn prepare_editor(&mut self) {
+        if self.editor.is_none() && self.renderer.is_ready_to_trace() {
+            self.prepare_probe();
+            let before = self.renderer.lights_before_hand();
+            let now = self
+                .renderer
+                .world()
+                .map(|w| ChangeableLights::of(&w.relit));
+            self.editor = before
+                .zip(now)
+                .map(|(before, now)| Editor::new(before, now));
+        }
+    }
+
+    /// Shows the changes of the list of lights.
+    pub(super) fn apply_lights(&mut self) {
+        let Some(editor) = &self.editor else {
+            return;
+        };
+        match self.renderer.light_by_hand(&editor.file()) {
+            Ok(changed) => {
+                self.message = Some(format!("lights changed in {:.2} s", changed.seconds));
+            }
+            Err(e) => self.message = Some(e.to_string()),
+        }
+    }
+
+    /// Sets settings.
+    fn change(&mut self, changes: &[Change]) -> Result<()> {
+        let mut latched = false;
+        for change in changes {
+            let Some(row) = row(change.name) else {
+                continue;
+            };
+            if change.name == "rt_accumulate" {
+                self.shown = match change.value == "0" {
+                    true => Shown::Traced,
+                    false => Shown::Reference,
+                };
+            }
+            row.put(&mut self.settings, &Given::parse(&change.value))?;
+            latched |= row.spec.flags & flags::LATCH != 0;
+        }
+        if latched {
+            self.reload();
+        }
+        Ok(())
+    }
+
+    /// Moves the camera and the time; whether the camera moves.
+    fn advance(&mut self, seconds: f32) -> bool {
+        if self.animates && self.shown != Shown::Reference {
+            self.time += seconds;
+        }
+        if self.motion.walks {
+            self.prepare_probe();
+        }
+        let context = self.gui.context();
+        if context.wants_keyboard_input() {
+            return false;
+        }
+        let probe = self.map.as_ref().and_then(|map| map.probe.as_ref());
+        context.input(|input| self.motion.advance(input, seconds, probe))
+    }
+
+    pub(super) fn prepare_probe(&mut self) {
+        if let (Some(map), Some(world)) = (&mut self.map, self.renderer.world()) {
+            map.probe.get_or_insert_with(|| Probe::new(&world.relit));
+        }
+    }
+
+    /// The view's rectangle, pixels.
+    fn view_pixels(&self) -> Option<(UVec2, UVec2)> {
+        let scale = self.gui.context().pixels_per_point();
+        let (width, height) = self.renderer.size();
+        let limit = UVec2::new(width, height);
+        let pixels = |p: egui::Pos2| {
+            (Vec2::new(p.x, p.y) * scale)
+                .round()
+                .max(Vec2::ZERO)
+                .as_uvec2()
+        };
+        let low = pixels(self.view_rect.min).min(limit);
+        let high = pixels(self.view_rect.max).min(limit);
+        (high.cmpgt(low + 8)).all().then(|| (low, high - low))
+    }
+
+    /// The view of the newest frame.
+    pub(super) fn view(&self) -> Option<RefDef> {
+        let (corner, size) = self.view_pixels()?;
+        Some(RefDef {
+            x: corner.x as i32,
+            y: corner.y as i32,
+            time_ms: (self.time * 1000.0) as i32,
+            ..self.motion.camera.ref_def((size.x, size.y), FOV)
+        })
+    }
+
+    /// Projection of the view to the window, points.
+    pub(super) fn screen(&self) -> Option<Screen> {
+        let def = self.view()?;
+        let rect = self.view_rect;
+        Some(Screen::new(
+            def.view_origin,
+            def.view_axis,
+            [def.fov_x, def.fov_y],
+            Vec2::new(rect.left(), rect.top()),
+            Vec2::new(rect.width(), rect.height()),
+        ))
+    }
+
+    /// Names the surface at a place of the window, points.
+    pub(super) fn pick(&mut self, at: Vec2) {
+        self.prepare_probe();
+        let (Some(screen), Some(def)) = (self.screen(), self.view()) else {
+            return;
+        };
+        let ray = screen.ray(def.view_axis, [def.fov_x, def.fov_y], at);
+        let (Some(map), Some(world)) = (&self.map, self.renderer.world()) else {
+            return;
+        };
+        let Some(probe) = &map.probe else {
+            return;
+        };
+        let met = probe.surface(def.view_origin, ray);
+        self.picked = met
+            .and_then(|met| Picked::new(&world.relit, probe, met, &*map.files, &map.diagnostics));
+    }
+
+    /// Draws the looks, then the panels.
+    fn draw(&mut self, ui: renderer_vk::api::UiFrame) -> Result<()> {
+        let traces = self.shown != Shown::Classic && self.found;
+        self.settings.rt = traces;
+        self.settings.rt_accumulate = self.shown == Shown::Reference;
+        self.renderer.set_settings(&self.settings);
+        self.renderer.begin_frame((self.time * 1000.0) as i32);
+        let def = self.view();
+        if let (Some(def), Some(map)) = (def, &self.map) {
+            let mut view = |def: &RefDef| {
+                self.renderer.clear_scene();
+                for entity in &map.entities {
+                    self.renderer.add_entity(entity);
+                }
+                self.renderer.render_scene(def)
+            };
+            if traces {
+                view(&RefDef {
+                    look: Some(Look::Traced),
+                    ..def
+                })?;
+            }
+            if !traces || self.shown == Shown::Split {
+                let width = (def.width as f32 * self.split) as i32;
+                let part = traces.then_some([def.x, def.y, width, def.height]);
+                view(&RefDef {
+                    look: Some(Look::Classic),
+                    part,
+                    ..def
+                })?;
+            }
+            let complete = traces || self.shown == Shown::Classic;
+            self.complete_frames = match (complete, self.shown) {
+                (false, _) => 0,
+                (true, Shown::Reference) => self.renderer.accumulated_frames(),
+                (true, _) => self.complete_frames.saturating_add(1),
+            };
+            let opened = self.opened;
+            self.first_picture
+                .get_or_insert_with(|| opened.elapsed().as_secs_f32());
+        }
+        self.renderer.draw_ui(ui)?;
+        self.renderer.end_frame()?;
+        if traces {
+            self.prepare_editor();
+        }
+        self.costs.add(&self.renderer.timings());
+        Ok(())
+    }
+}
+
+/// Horizontal field of view, degrees.
+pub const FOV: f32 = 90.0;
