@@ -129,16 +129,17 @@ impl From<Viewpoint> for Camera {
     }
 }
 
+impl From<Camera> for Viewpoint {
+    fn from(camera: Camera) -> Self {
+        let Camera { origin, yaw, pitch } = camera;
+        Self { origin, yaw, pitch }
+    }
+}
+
 impl Camera {
     /// Axes: forward, left, up.
     pub fn axis(&self) -> [Vec3; 3] {
-        let (sy, cy) = self.yaw.to_radians().sin_cos();
-        let (sp, cp) = self.pitch.to_radians().sin_cos();
-        [
-            Vec3::new(cp * cy, cp * sy, -sp),
-            Vec3::new(-sy, cy, 0.0),
-            Vec3::new(sp * cy, sp * sy, cp),
-        ]
+        Viewpoint::from(*self).axis()
     }
 
     /// The view for a picture of `size` pixels; `fov`: horizontal, degrees.

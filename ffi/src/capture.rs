@@ -112,6 +112,8 @@ pub struct Captures {
     /// `rt_screenshot`.
     pub still: Option<StillShot>,
     next_number: [u32; 2],
+    /// Number of the next picture of `rt_photo`.
+    pub next_photo: u32,
 }
 
 /// Number of file numbers: file names have four digits.

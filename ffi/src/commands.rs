@@ -7,6 +7,9 @@ use crate::cvars::Cvar;
 use crate::delivery::{set_variables, take_captures_of_last_frame};
 use crate::engine::{self, Engine, valid_path_to_write};
 use crate::failure::Failure;
+use crate::menu::Menu;
+use crate::menu::pointer::keys_of_word;
+use crate::photo::Photo;
 use crate::presets::{self, Trial};
 use crate::session::{self, Front, with_renderer};
 use crate::window;
@@ -46,6 +49,8 @@ static COMMANDS: &[(&CStr, Function)] = &[
     (c"rt_screenshot", still),
     (c"rt_path", path),
     (c"rt_preset", preset),
+    (c"rt_menu", menu),
+    (c"rt_photo", photo),
     (c"report", report),
 ];
 
@@ -214,6 +219,64 @@ unsafe extern "C" fn preset() {
             engine.say(&format!("{line}\n"));
         }
         Ok(())
+    });
+}
+
+/// Opens the menu, or closes it. With a word: a key for the open menu.
+unsafe extern "C" fn menu() {
+    entry(|| {
+        let Some(engine) = engine::current() else {
+            return Ok(());
+        };
+        let arguments = engine.arguments();
+        let word = arguments.get(1).map(String::as_str);
+        let keys = word.map(keys_of_word);
+        let line = with_renderer(|renderer, front| {
+            let open = front.menu.is_some();
+            Ok(match keys {
+                Some(None) => Some("usage: rt_menu [up|down|left|right|enter|close]".to_owned()),
+                Some(Some(keys)) if open => {
+                    front.menu_keys.extend(keys);
+                    None
+                }
+                // a key for a closed menu, such as by a bind
+                Some(Some(_)) => None,
+                None if open => {
+                    front.menu = None;
+                    window::input::end();
+                    None
+                }
+                None => {
+                    front.menu = Some(Menu::new(renderer.size()));
+                    window::input::begin();
+                    None
+                }
+            })
+        })?;
+        if let Some(line) = line {
+            engine.say(&format!("{line}\n"));
+        }
+        Ok(())
+    });
+}
+
+/// Begins photo mode, or ends it.
+unsafe extern "C" fn photo() {
+    print_lines(|renderer, front, _| {
+        if front.photo.take().is_some() {
+            renderer.cancel_still();
+            window::input::end();
+            return Vec::new();
+        }
+        match front.world_view {
+            Some(view) if front.settings.rt && renderer.world().is_some() => {
+                front.menu = None;
+                front.photo = Some(Photo::new(&view, renderer.size()));
+                window::input::begin();
+                Vec::new()
+            }
+            _ => vec!["rt_photo needs the traced look: set r_rt 1 and start a map first".into()],
+        }
     });
 }
 
@@ -401,7 +464,7 @@ fn begin_still(
 ) -> Result<Option<String>, Failure> {
     let exists = |path: &str| CString::new(path).is_ok_and(|path| engine.home_file_exists(&path));
     with_renderer(|renderer, front| {
-        if let Err(reason) = renderer.request_still(samples, size) {
+        if let Err(reason) = renderer.request_still(samples, size, false) {
             return Ok(Some(format!("rt_screenshot: {reason}")));
         }
         let path = front.captures.next_path(Format::Tga, exists);

@@ -100,6 +100,7 @@ pub fn view(from: &refdef_t) -> RefDef {
         flags: from.rdflags.cast_unsigned(),
         area_mask: from.areamask,
         text: from.text,
+        ..RefDef::default()
     }
 }
 

@@ -8,6 +8,8 @@ use crate::failure::Failure;
 use crate::session::{Front, with_renderer};
 use renderer_vk::Renderer;
 use renderer_vk::api::Picture;
+use renderer_vk::settings::Preset;
+use std::borrow::Cow;
 use std::ffi::c_int;
 
 /// Output for the engine, delivered once the frame has ended and the state is back in its cell.
@@ -20,11 +22,22 @@ pub struct Outbox {
     /// Lines for the console, without line ends.
     pub lines: Vec<String>,
     /// Console variables to set, and their values.
-    pub variables: Vec<(&'static str, &'static str)>,
+    pub variables: Vec<(&'static str, Cow<'static, str>)>,
+    /// Commands for the engine.
+    pub commands: Vec<&'static str>,
     /// Time of the game for the frame, milliseconds.
     pub front_end_ms: c_int,
     /// Time of the renderer for ending the frame, milliseconds.
     pub back_end_ms: c_int,
+}
+
+impl Outbox {
+    /// Sets the variables of a preset.
+    pub fn set(&mut self, preset: &Preset) {
+        let values = preset.values();
+        self.variables
+            .extend(values.map(|(name, value)| (name, Cow::Borrowed(value))));
+    }
 }
 
 /// Takes captures requested between two frames. They show the previous frame, which is on the screen. During a frame,
@@ -113,6 +126,9 @@ pub fn deliver(engine: Engine, outbox: Outbox) {
         }
     }
     set_variables(engine, outbox.variables);
+    for command in outbox.commands {
+        engine.append_command(&c_text(&format!("{command}\n")));
+    }
     for line in outbox.lines {
         engine.say(&format!("{line}\n"));
     }
@@ -125,10 +141,10 @@ pub fn deliver(engine: Engine, outbox: Outbox) {
 /// Sets console variables.
 pub fn set_variables(
     engine: Engine,
-    values: impl IntoIterator<Item = (&'static str, &'static str)>,
+    values: impl IntoIterator<Item = (&'static str, impl AsRef<str>)>,
 ) {
     for (name, value) in values {
-        engine.cvar_set(&c_text(name), value);
+        engine.cvar_set(&c_text(name), value.as_ref());
     }
 }
 

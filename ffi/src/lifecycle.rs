@@ -10,6 +10,7 @@ use crate::engine::{self, Engine, valid_game_path};
 use crate::failure::Failure;
 use crate::files::EngineFiles;
 use crate::glconfig;
+use crate::panels::draw_panels;
 use crate::presets::Step;
 use crate::session::{self, Front, with_renderer};
 use crate::window::{self, Window};
@@ -80,6 +81,7 @@ pub unsafe extern "C" fn begin_registration(out: *mut glconfig_t) {
         }
         // The input code reads nothing of ours, but it is the engine's: no state is held.
         window::give_to_input_once(engine);
+        window::input::install();
 
         session::with(|session| {
             let front = &mut session.front;
@@ -251,8 +253,16 @@ pub fn end(ending: Ending) {
     }
     // The engine would keep our function pointers after unloading the library.
     commands::remove(engine);
+    match ending {
+        Ending::KeepAll => window::input::end(),
+        // this library may be unloaded next
+        Ending::KeepWindow | Ending::Close | Ending::Leave => window::input::remove(),
+    }
     let destroyed = session::with(|session| {
         session.front.registered = false;
+        session.front.menu = None;
+        session.front.photo = None;
+        session.front.world_view = None;
         session.front.trial = None;
         session.front.clip_region = None;
         session.front.captures.clear();
@@ -321,6 +331,9 @@ pub unsafe extern "C" fn begin_frame(stereo: c_int) {
                 cvars::write_back_limits(cvars);
                 cvars::apply(cvars, &mut front.settings);
             }
+            if let Some(photo) = &front.photo {
+                photo.put(&mut front.settings);
+            }
             front.frame_start = Some(Instant::now());
             renderer.set_settings(&front.settings);
             renderer.begin_frame(engine.milliseconds());
@@ -378,6 +391,7 @@ fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Fa
         .frame_start
         .take()
         .map_or(0, |begin| milliseconds(start - begin));
+    draw_panels(renderer, front, &mut outbox)?;
     take_captures(renderer, front, &mut outbox)?;
     let skipped = std::mem::take(&mut front.skip_present);
     renderer.set_hidden(skipped || window::current().is_some_and(|window| window.is_hidden()));
@@ -406,12 +420,12 @@ fn go_on_with_trial(renderer: &Renderer, front: &mut Front, outbox: &mut Outbox)
     match trial.frame(Instant::now(), renderer.costs().traced_ms()) {
         Step::Measures => {}
         Step::Try(preset, ms) => {
-            outbox.variables.extend(preset.values());
+            outbox.set(preset);
             let line = format!("a frame takes {ms:.1} ms; trying {}", preset.name);
             outbox.lines.push(line);
         }
         Step::Ends(preset, ms) => {
-            outbox.variables.extend(preset.values());
+            outbox.set(preset);
             let cost = ms.map_or_else(String::new, |ms| format!("; a frame takes {ms:.1} ms"));
             outbox
                 .lines
@@ -445,10 +459,10 @@ fn finish_still(
         // its map was unloaded
         None => front.captures.still = None,
     }
-    if let Some(picture) = renderer.take_still().map_err(Failure::from)?
+    if let Some(still) = renderer.take_still().map_err(Failure::from)?
         && let Some(shot) = front.captures.still.take()
     {
-        (outbox.files).push((shot.path, capture::tga(&picture)?, false));
+        (outbox.files).push((shot.path, capture::tga(&still.picture)?, false));
     }
     Ok(())
 }

@@ -333,10 +333,11 @@ pub unsafe extern "C" fn render_scene(from: *const refdef_t) {
             if front.settings.no_refresh {
                 return Ok(());
             }
-            if let Some((_, lines)) = &mut front.path
-                && view.flags & rdflags::NO_WORLD_MODEL == 0
-            {
-                lines.push_str(&PathPoint::of(&view).line());
+            if view.flags & rdflags::NO_WORLD_MODEL == 0 {
+                front.world_view = Some(view);
+                if let Some((_, lines)) = &mut front.path {
+                    lines.push_str(&PathPoint::of(&view).line());
+                }
             }
             renderer.render_scene(&view).map_err(Failure::from)
         })?;

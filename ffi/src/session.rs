@@ -10,8 +10,12 @@ use crate::cinematics::Cinematics;
 use crate::costs::Questions;
 use crate::cvars::Cvars;
 use crate::failure::Failure;
+use crate::menu::Menu;
+use crate::photo::Photo;
 use crate::presets::Trial;
 use crate::window;
+use crate::window::input::Input;
+use renderer_vk::api::RefDef;
 use renderer_vk::{Renderer, Settings};
 use std::cell::{Cell, UnsafeCell};
 use std::sync::Mutex;
@@ -41,6 +45,14 @@ pub struct Front {
     pub captures: Captures,
     /// Requests of `rt_stats` and `rt_printPerfStats`.
     pub questions: Questions,
+    /// `rt_menu`, while it is open.
+    pub menu: Option<Menu>,
+    /// `rt_photo`, while it is open.
+    pub photo: Option<Photo>,
+    /// The game's view of the world in the newest frame.
+    pub world_view: Option<RefDef>,
+    /// Keys for the menu by its command.
+    pub menu_keys: Vec<Input>,
     /// `rt_preset auto`, while it measures.
     pub trial: Option<Trial>,
     /// The camera path being recorded by `rt_path`: its file and its lines.

@@ -8,6 +8,7 @@
 )]
 
 mod costs;
+mod motion;
 mod settings;
 
 use std::collections::HashMap;
@@ -18,6 +19,7 @@ use renderer_vk::api::{UiFrame, UiMesh, UiTexture, UiVertex};
 
 pub use costs::{CostHistory, frame_time};
 pub use egui;
+pub use motion::{Motion, WALK_SPEED};
 pub use settings::{Change, MAIN, all_settings, main_settings, presets};
 
 /// A user interface: egui's state and its textures.

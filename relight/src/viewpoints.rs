@@ -9,7 +9,7 @@ pub const VIEW_HEIGHT: f32 = 26.0;
 pub const SPAWN_LIFT: f32 = 9.0;
 
 /// A place to look from.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Viewpoint {
     /// Camera position, id units.
     pub origin: Vec3,
@@ -17,6 +17,19 @@ pub struct Viewpoint {
     pub yaw: f32,
     /// Degrees down.
     pub pitch: f32,
+}
+
+impl Viewpoint {
+    /// Axes: forward, left, up.
+    pub fn axis(&self) -> [Vec3; 3] {
+        let (sy, cy) = self.yaw.to_radians().sin_cos();
+        let (sp, cp) = self.pitch.to_radians().sin_cos();
+        [
+            Vec3::new(cp * cy, cp * sy, -sp),
+            Vec3::new(-sy, cy, 0.0),
+            Vec3::new(sp * cy, sp * sy, cp),
+        ]
+    }
 }
 
 /// Whether the game sets players at an entity: `info_player_deathmatch` and `info_player_start`, those of other games

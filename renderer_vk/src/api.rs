@@ -112,6 +112,27 @@ pub struct RefDef {
     pub part: Option<[i32; 4]>,
 }
 
+/// A free camera for held views (`rt_pause`). It shows what other people see: the player's body instead of the
+/// first-person weapon.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FreeCamera {
+    /// Position.
+    pub origin: Vec3,
+    /// Forward, left, up.
+    pub axis: [Vec3; 3],
+    /// Full vertical angle, degrees. The horizontal one follows from the view's size.
+    pub fov_y: f32,
+}
+
+/// A finished still picture.
+#[derive(Clone, Debug)]
+pub struct StillPicture {
+    /// As the display would show it.
+    pub picture: Picture,
+    /// The linear picture before exposure, if it was requested; display white has radiance 1.
+    pub radiance: Option<Vec<[f32; 3]>>,
+}
+
 /// A look of a view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Look {

@@ -13,6 +13,7 @@ mod frame;
 mod gpu;
 mod half;
 pub mod path;
+pub mod picture_files;
 mod raster;
 mod renderer;
 pub mod report;

@@ -13,7 +13,7 @@ use std::time::Instant;
 
 use glam::Vec3;
 
-use crate::api::{DynamicLight, Look, PolyVert, RefDef, RefEntity, UiFrame, rdflags};
+use crate::api::{DynamicLight, FreeCamera, Look, PolyVert, RefDef, RefEntity, UiFrame, rdflags};
 use crate::assets::Assets;
 use crate::error::Error;
 use crate::frame::Item;
@@ -114,6 +114,7 @@ pub struct Renderer {
     calibrations: Option<relight::CalibrationCache>,
     /// The window is minimised.
     hidden: bool,
+    hides_overlay: bool,
 }
 
 /// Finds a device without making a window; returns its name and features.
@@ -212,6 +213,7 @@ impl Renderer {
             entity_tokens: EntityTokens::default(),
             calibrations: None,
             hidden: false,
+            hides_overlay: false,
         })
     }
 
@@ -381,6 +383,16 @@ impl Renderer {
         self.queue_overlay();
         self.queue.push((Item::Ui(meshes), ColorMask::ALL));
         Ok(())
+    }
+
+    /// Sets a camera for the views that `rt_pause` holds; `None`: their own.
+    pub fn set_free_camera(&mut self, camera: Option<FreeCamera>) {
+        self.held.camera = camera;
+    }
+
+    /// Leaves out 2D pictures, such as a game's display of health and ammunition.
+    pub fn hide_overlay(&mut self, hide: bool) {
+        self.hides_overlay = hide;
     }
 
     /// Sets the folder that caches light calibrations of maps, so that the traced look starts without calibrating

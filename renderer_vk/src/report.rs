@@ -4,11 +4,11 @@ use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::io::{Cursor, Write as _};
 
-use image::ImageEncoder;
 use zip::write::{SimpleFileOptions, ZipWriter};
 
 use crate::api::Picture;
 use crate::gpu::DeviceInfo;
+use crate::picture_files::png;
 use crate::settings::ROWS;
 use crate::statistics::Costs;
 
@@ -65,15 +65,8 @@ impl Report<'_> {
         text("settings.txt", &self.settings())?;
         text("log.txt", &lines(self.log))?;
         for (name, picture) in self.pictures {
-            let mut png = Vec::new();
-            image::codecs::png::PngEncoder::new(&mut png).write_image(
-                &picture.rgb,
-                picture.width,
-                picture.height,
-                image::ExtendedColorType::Rgb8,
-            )?;
             zip.start_file(format!("{name}.png"), SimpleFileOptions::default())?;
-            zip.write_all(&png)?;
+            zip.write_all(&png(picture)?)?;
         }
         Ok(zip.finish()?.into_inner())
     }

@@ -2,7 +2,6 @@
 
 mod app;
 mod lights;
-mod motion;
 mod panels;
 mod picked;
 mod source;

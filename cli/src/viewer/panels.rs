@@ -8,7 +8,8 @@ use super::lights::{Item, Kind, Screen};
 use super::picked::{decoded, encoded};
 use super::source::Progress;
 use super::state::{FOV, Shown, Viewer};
-use crate::view::{Camera, map_name};
+use crate::view::map_name;
+use relight::viewpoints::Viewpoint;
 
 /// Width of the panel, points.
 const PANEL: f32 = 360.0;
@@ -84,7 +85,7 @@ impl Viewer {
 
     /// The command line that renders the view.
     pub(super) fn command(&self) -> String {
-        let Camera {
+        let Viewpoint {
             origin: o,
             yaw,
             pitch,
@@ -115,7 +116,7 @@ impl Viewer {
                 .as_ref()
                 .map_or("loading", |map| map_name(&map.name));
             ui.strong(name);
-            let Camera {
+            let Viewpoint {
                 origin: o,
                 yaw,
                 pitch,
@@ -223,14 +224,14 @@ impl Viewer {
                 }
             });
             if let Some(camera) = chosen {
-                self.motion.camera = camera;
+                self.motion.camera = camera.into();
             }
             ui.horizontal(|ui| {
                 if ui.button("keep this view").clicked()
                     && let Some(map) = &mut self.map
                 {
                     let name = format!("view {}", map.cameras.len());
-                    map.cameras.push((name, self.motion.camera));
+                    map.cameras.push((name, self.motion.camera.into()));
                 }
                 if ui.button("copy as command").on_hover_text("P").clicked() {
                     self.copy_view(ui.ctx());

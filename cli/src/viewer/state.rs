@@ -8,9 +8,10 @@ use anyhow::{Context, Result};
 use clap::ValueEnum;
 use glam::{UVec2, Vec2};
 use gui::egui::{self, PlatformOutput, RawInput};
-use gui::{Change, CostHistory, Gui};
+use gui::{Change, CostHistory, Gui, Motion};
 use relight::light::ChangeableLights;
 use relight::probe::Probe;
+use relight::viewpoints::Viewpoint;
 use relight::{CalibrationCache, GameFiles};
 use renderer_vk::api::{Look, Picture, RefDef, RefEntity};
 use renderer_vk::settings::{Given, Preset, flags, row};
@@ -18,7 +19,6 @@ use renderer_vk::{Renderer, Settings};
 use shaderscript::Diagnostic;
 
 use super::lights::{Editor, Screen, lights_path};
-use super::motion::Motion;
 use super::picked::Picked;
 use super::source::{Changed, Changes, Finder, Progress, Source};
 use crate::scripts::load_scripts;
@@ -171,7 +171,7 @@ impl Viewer {
             stage: Stage::Opens,
             shown: start.shown,
             settings,
-            motion: Motion::new(Camera::default()),
+            motion: Motion::new(Viewpoint::default()),
             camera: start.camera,
             spawn: start.spawn,
             map: None,
@@ -319,9 +319,10 @@ impl Viewer {
         if let Some(camera) = overview {
             cameras.push(("overview".to_owned(), camera));
         }
-        let kept = self.map.is_some().then_some(self.motion.camera);
+        let kept = (self.map.is_some()).then_some(Camera::from(self.motion.camera));
         let first = cameras.first().map(|(_, camera)| *camera);
-        self.motion.camera = kept.or(self.camera.take()).or(first).unwrap_or_default();
+        let camera = kept.or(self.camera.take()).or(first);
+        self.motion.camera = camera.unwrap_or_default().into();
         let given = self.source.map.clone().unwrap_or_default();
         self.lights_path = lights_path(
             self.source.lights.as_ref(),
@@ -520,7 +521,7 @@ impl Viewer {
             x: corner.x as i32,
             y: corner.y as i32,
             time_ms: (self.time * 1000.0) as i32,
-            ..self.motion.camera.ref_def((size.x, size.y), FOV)
+            ..Camera::from(self.motion.camera).ref_def((size.x, size.y), FOV)
         })
     }
 

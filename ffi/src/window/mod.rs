@@ -4,6 +4,7 @@
 //! It is stored in its own cell, separate from the renderer, because it must be accessible after an error of the engine
 //! has abandoned a call of the renderer (see `session`).
 
+pub mod input;
 pub mod modes;
 pub mod sdl;
 

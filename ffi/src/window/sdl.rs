@@ -29,6 +29,9 @@ pub const POSITION_CENTERED: c_int = 0x2FFF_0000;
 /// An `SDL_Window`.
 pub type WindowPtr = *mut c_void;
 
+/// An `SDL_EventFilter`: its data, an `SDL_Event`; 0 drops the event.
+pub type Filter = unsafe extern "C" fn(*mut c_void, *mut c_void) -> c_int;
+
 /// `SDL_DisplayMode`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
@@ -112,6 +115,9 @@ sdl! {
     num_display_modes = "SDL_GetNumDisplayModes": fn(c_int) -> c_int;
     display_mode = "SDL_GetDisplayMode": fn(c_int, c_int, *mut DisplayMode) -> c_int;
     pump_events = "SDL_PumpEvents": fn();
+    set_event_filter = "SDL_SetEventFilter": fn(Option<Filter>, *mut c_void);
+    get_event_filter = "SDL_GetEventFilter": fn(*mut Option<Filter>, *mut *mut c_void) -> c_int;
+    relative_mouse = "SDL_GetRelativeMouseMode": fn() -> c_int;
     vulkan_extensions = "SDL_Vulkan_GetInstanceExtensions": fn(WindowPtr, *mut u32, *mut *const c_char) -> c_int;
     vulkan_loader = "SDL_Vulkan_GetVkGetInstanceProcAddr": fn() -> *mut c_void;
     vulkan_surface = "SDL_Vulkan_CreateSurface": fn(WindowPtr, *mut c_void, *mut u64) -> c_int;
@@ -131,11 +137,11 @@ const SDL_NAME: &str = "libSDL2-2.0.0.dylib";
 #[cfg(all(unix, not(target_os = "macos")))]
 const SDL_NAME: &str = "libSDL2-2.0.so.0";
 
-/// The SDL that is already loaded, as a shared library or inside of the executable; otherwise the system's.
-fn open() -> Result<Library, SdlError> {
+/// The SDL that is already loaded, as a shared library or inside of the executable.
+fn already_loaded() -> Option<Library> {
     #[cfg(unix)]
     {
-        use libloading::os::unix::{Library as UnixLibrary, RTLD_LAZY, RTLD_NOW};
+        use libloading::os::unix::{Library as UnixLibrary, RTLD_LAZY};
         // glibc's value; other systems of this family have the same or ignore it.
         #[cfg(target_os = "linux")]
         const RTLD_NOLOAD: c_int = 4;
@@ -143,13 +149,32 @@ fn open() -> Result<Library, SdlError> {
         const RTLD_NOLOAD: c_int = 0x10;
         // SAFETY: with NOLOAD no code of the library runs.
         if let Ok(library) = unsafe { UnixLibrary::open(Some(SDL_NAME), RTLD_LAZY | RTLD_NOLOAD) } {
-            return Ok(library.into());
+            return Some(library.into());
         }
         let own: Library = UnixLibrary::this().into();
         // SAFETY: only tests whether the symbol exists.
-        if unsafe { own.get::<*const c_void>(b"SDL_CreateWindow\0") }.is_ok() {
-            return Ok(own);
-        }
+        unsafe { own.get::<*const c_void>(b"SDL_CreateWindow\0") }
+            .is_ok()
+            .then_some(own)
+    }
+    #[cfg(windows)]
+    {
+        use libloading::os::windows::Library as WindowsLibrary;
+        // ioquake3 named its 64-bit copy SDL264.dll until July 2025.
+        let names = [SDL_NAME, "SDL264.dll"].into_iter();
+        let mut found = names.filter_map(|name| WindowsLibrary::open_already_loaded(name).ok());
+        found.next().map(Into::into)
+    }
+}
+
+/// The loaded SDL, otherwise the system's.
+fn open() -> Result<Library, SdlError> {
+    if let Some(library) = already_loaded() {
+        return Ok(library);
+    }
+    #[cfg(unix)]
+    {
+        use libloading::os::unix::{Library as UnixLibrary, RTLD_NOW};
         // SAFETY: SDL's initialisers are safe at load time.
         unsafe { UnixLibrary::open(Some(SDL_NAME), RTLD_NOW) }
             .map(Into::into)
@@ -157,13 +182,6 @@ fn open() -> Result<Library, SdlError> {
     }
     #[cfg(windows)]
     {
-        use libloading::os::windows::Library as WindowsLibrary;
-        // ioquake3 named its 64-bit copy SDL264.dll until July 2025.
-        for name in [SDL_NAME, "SDL264.dll"] {
-            if let Ok(library) = WindowsLibrary::open_already_loaded(name) {
-                return Ok(library.into());
-            }
-        }
         // SAFETY: SDL's initialisers are safe at load time.
         unsafe { Library::new(SDL_NAME) }.map_err(|e| SdlError::NoLibrary(e.to_string()))
     }
@@ -179,6 +197,44 @@ impl Sdl {
         let sdl = Sdl::from_library(&library);
         std::mem::forget(library);
         sdl
+    }
+
+    /// The SDL that the engine has loaded; `None` without one. It stays loaded.
+    pub fn loaded() -> Option<Sdl> {
+        let library = already_loaded()?;
+        let sdl = Sdl::from_library(&library).ok();
+        std::mem::forget(library);
+        sdl
+    }
+
+    /// Whether SDL's video runs.
+    pub fn runs_video(&self) -> bool {
+        // SAFETY: SDL allows any set of subsystems, at any time.
+        unsafe { (self.was_init)(INIT_VIDEO) != 0 }
+    }
+
+    /// Whether the pointer is invisible and only its motion counts.
+    pub fn is_pointer_relative(&self) -> bool {
+        // SAFETY: no arguments.
+        unsafe { (self.relative_mouse)() != 0 }
+    }
+
+    /// The filter of events and its data.
+    pub fn event_filter(&self) -> Option<(Filter, *mut c_void)> {
+        let mut filter = None;
+        let mut data = ptr::null_mut();
+        // SAFETY: SDL fills both pointers; without a filter it stores null and returns 0.
+        let set = unsafe { (self.get_event_filter)(&mut filter, &mut data) };
+        filter.filter(|_| set != 0).map(|filter| (filter, data))
+    }
+
+    /// Sets the filter of events. SDL also empties its queue of events.
+    ///
+    /// # Safety
+    /// `filter` must be callable with `data` on any thread until another filter is set.
+    pub unsafe fn set_event_filter(&self, filter: Option<Filter>, data: *mut c_void) {
+        // SAFETY: the caller's contract is that of SDL.
+        unsafe { (self.set_event_filter)(filter, data) }
     }
 
     fn error(&self, call: &'static str) -> SdlError {

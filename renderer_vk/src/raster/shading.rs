@@ -274,6 +274,16 @@ impl StageContext<'_> {
         (shading, self.textured(texture, kind, draw))
     }
 
+    /// The draw of a texture with a sampler, times vertex colours with their alpha.
+    pub fn translucent_image(&self, texture: u32, kind: u32, draw: Draw) -> (Shading, Draw) {
+        let (shading, draw) = self.image(texture, kind, draw);
+        let shading = Shading {
+            alpha_gen: PerStage::first(c::ALPHAGEN_VERTEX),
+            ..shading
+        };
+        (shading, draw)
+    }
+
     /// The draw of a texture with a sampler, at the brightness of white before overbright bits. That factor is not
     /// rounded to a byte: the engine passes this colour as floats.
     pub fn plain_image(&self, texture: u32, kind: u32, draw: Draw) -> (Shading, Draw) {

@@ -95,7 +95,8 @@ impl UiMeshes {
                 ..Draw::default()
             };
             // bindless indices fit into 32 bits
-            let (shading, draw) = stages.image(mesh.texture as u32, sampler::CLAMP, draw);
+            let (shading, draw) =
+                stages.translucent_image(mesh.texture as u32, sampler::CLAMP, draw);
             let state = State {
                 blend: Some((c::BLEND_ONE, c::BLEND_ONE_MINUS_SRC_ALPHA)),
                 shading,

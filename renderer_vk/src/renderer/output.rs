@@ -9,7 +9,7 @@ use crate::api::Picture;
 use crate::assets::ImageSource;
 use crate::error::Error;
 use crate::frame::{CLEAR, FrameContext, Item};
-use crate::gpu::{ColorMask, Format, Recorder};
+use crate::gpu::{ColorMask, Format, Image, Recorder};
 use crate::half::half;
 use crate::raster::{self, Present};
 use crate::scene::Statistics;
@@ -69,6 +69,9 @@ impl Renderer {
     }
 
     pub(super) fn queue_overlay(&mut self) {
+        if self.hides_overlay {
+            self.overlay.clear();
+        }
         if !self.overlay.is_empty() {
             // A new overlay if no spare one is left.
             let empty = self.spare_overlays.pop().unwrap_or_default();
@@ -306,14 +309,16 @@ impl Renderer {
     /// The device is lost or out of memory.
     pub fn read_radiance(&mut self) -> Result<Vec<[f32; 3]>, Error> {
         self.flush(false)?;
-        let Some(hdr) = self.trace.as_ref().and_then(TraceLook::hdr) else {
-            return Ok(Vec::new());
-        };
-        let (bytes, is_half) = (
-            self.device.read_image(hdr)?,
-            hdr.format() == Format::Rgba16F,
-        );
-        if is_half {
+        match self.trace.as_ref().and_then(TraceLook::hdr) {
+            Some(hdr) => self.radiance_of(hdr),
+            None => Ok(Vec::new()),
+        }
+    }
+
+    /// RGB of a linear image.
+    pub(super) fn radiance_of(&self, hdr: &Image) -> Result<Vec<[f32; 3]>, Error> {
+        let bytes = self.device.read_image(hdr)?;
+        if hdr.format() == Format::Rgba16F {
             let texels: Vec<[u16; 4]> = bytemuck::pod_collect_to_vec(&bytes);
             return Ok(texels
                 .iter()

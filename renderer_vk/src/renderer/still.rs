@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::Renderer;
-use crate::api::Picture;
+use crate::api::{Picture, StillPicture};
 use crate::error::Error;
 use crate::gpu::Recorder;
 use crate::scene::TracedScene;
@@ -15,6 +15,8 @@ pub(super) struct StillRequest {
     /// Size and number of samples, until the next traced view of the world.
     wanted: Option<([u32; 2], u32)>,
     still: Option<Still>,
+    /// The linear picture is wanted, too.
+    radiance: bool,
     /// Frames of the picture per frame of the game.
     pace: u32,
     last: Option<Instant>,
@@ -37,12 +39,17 @@ impl StillRequest {
 impl Renderer {
     /// Requests a picture of the next traced view of the world, the mean of `samples` frames; `size` in pixels, `None`:
     /// the window's. It takes several frames: poll [`still_progress`](Self::still_progress), then call
-    /// [`take_still`](Self::take_still).
+    /// [`take_still`](Self::take_still). `radiance`: the linear picture is wanted, too.
     ///
     /// # Errors
     /// A message for the console: the traced look is off, another picture is in progress, or the device does not
     /// support images of this size.
-    pub fn request_still(&mut self, samples: u32, size: Option<(u32, u32)>) -> Result<(), String> {
+    pub fn request_still(
+        &mut self,
+        samples: u32,
+        size: Option<(u32, u32)>,
+        radiance: bool,
+    ) -> Result<(), String> {
         if !self.settings.rt {
             return Err("the traced look is off; set r_rt 1".into());
         }
@@ -57,6 +64,7 @@ impl Renderer {
             ));
         }
         self.still.wanted = Some(([width, height], samples));
+        self.still.radiance = radiance;
         Ok(())
     }
 
@@ -71,11 +79,11 @@ impl Renderer {
         self.still.cancel();
     }
 
-    /// The finished picture, as the display would show it; `None` before it is finished.
+    /// The finished picture; `None` before it is finished.
     ///
     /// # Errors
     /// The device is lost or out of memory.
-    pub fn take_still(&mut self) -> Result<Option<Picture>, Error> {
+    pub fn take_still(&mut self) -> Result<Option<StillPicture>, Error> {
         let finished = |still: &mut Still| {
             let (done, wanted) = still.progress();
             done >= wanted
@@ -83,14 +91,22 @@ impl Renderer {
         let Some(still) = self.still.still.take_if(finished) else {
             return Ok(None);
         };
+        let wants_radiance = self.still.radiance;
         self.still.cancel();
+        let radiance = match still.hdr().filter(|_| wants_radiance) {
+            Some(hdr) => Some(self.radiance_of(hdr)?),
+            None => None,
+        };
         let image = still.image();
         let rgba = self.device.read_image(image)?;
         let (width, height) = (image.width(), image.height());
-        Ok(Some(Picture {
-            width,
-            height,
-            rgb: self.displayed(&rgba, false),
+        Ok(Some(StillPicture {
+            picture: Picture {
+                width,
+                height,
+                rgb: self.displayed(&rgba, false),
+            },
+            radiance,
         }))
     }
 

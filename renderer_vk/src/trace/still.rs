@@ -52,6 +52,11 @@ impl Still {
         &self.target
     }
 
+    /// The linear picture, before exposure.
+    pub fn hdr(&self) -> Option<&Image> {
+        self.tracer.hdr()
+    }
+
     /// Records up to `count` more frames of the picture. A change of settings restarts it.
     ///
     /// # Errors

@@ -6,6 +6,7 @@ use tests::maps::HERE;
 
 for_every_engine!(
     presets_set_what_decides_about_cost,
+    a_menu_is_drawn_over_the_game_and_closes_without_a_trace,
     a_report_has_what_developers_ask_for_and_nothing_personal,
 );
 
@@ -36,6 +37,51 @@ fn presets_set_what_decides_about_cost() {
 
     assert!(ask(&mut engine, "rt_preset auto").contains("set r_rt 1 and start a map first"));
     assert_eq!(engine.cvar("rt_bounces").as_deref(), Some("2"));
+    engine.assert_clean();
+}
+
+fn a_menu_is_drawn_over_the_game_and_closes_without_a_trace() {
+    let mut engine = engine_in_map();
+    let view = View::new(HERE, 30.0);
+    let before = engine.picture(&view).unwrap();
+    let cvars = ["r_rt", "rt_scale", "rt_bounces"];
+    let values: Vec<_> = cvars.map(|name| engine.cvar(name)).into();
+    engine.take_messages();
+    engine.command("rt_menu").unwrap();
+    let open = engine.picture(&view).unwrap();
+    // egui lays out a window in its first frame and draws it in the second
+    let open = (engine.picture(&view).ok()).unwrap_or(open);
+    let alike = relight::compare::compare(&before, &open).unwrap();
+    assert!(alike.ssim < 0.97, "no menu: {alike:?}");
+    // keys along the widgets, and enter: a setting changes
+    for _ in 0..30 {
+        for key in ["down", "enter"] {
+            engine.command(&format!("rt_menu {key}")).unwrap();
+            engine.picture(&view).unwrap();
+            engine.picture(&view).unwrap();
+        }
+        if cvars.map(|name| engine.cvar(name)).as_slice() != values {
+            break;
+        }
+    }
+    assert_ne!(cvars.map(|name| engine.cvar(name)).as_slice(), values);
+    for (name, value) in cvars.iter().zip(&values) {
+        engine.set(name, value.as_deref().unwrap());
+    }
+    engine.command("rt_menu close").unwrap();
+    engine.picture(&view).unwrap();
+    let after = engine.picture(&view).unwrap();
+    let alike = relight::compare::compare(&before, &after).unwrap();
+    assert!(alike.ssim > 0.9999, "{alike:?}");
+    // the command closes it, too, and keys for a closed menu do nothing
+    engine.command("rt_menu").unwrap();
+    engine.command("rt_menu").unwrap();
+    engine.command("rt_menu enter").unwrap();
+    engine.picture(&view).unwrap();
+    let after = engine.picture(&view).unwrap();
+    let alike = relight::compare::compare(&before, &after).unwrap();
+    assert!(alike.ssim > 0.9999, "{alike:?}");
+    assert!(ask(&mut engine, "rt_menu sideways").contains("usage: rt_menu"));
     engine.assert_clean();
 }
 

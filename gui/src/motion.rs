@@ -1,10 +1,9 @@
-//! Motion of the viewer's camera: flying, and walking on the map's floors.
+//! Motion of a free camera: flying, and walking on the map's floors.
 
+use egui::{InputState, Key};
 use glam::{Vec2, Vec3};
-use gui::egui::{InputState, Key};
 use relight::probe::Probe;
-
-use crate::view::Camera;
+use relight::viewpoints::Viewpoint;
 
 /// Height of the eyes above the floor, units.
 const EYES: f32 = 50.0;
@@ -27,7 +26,7 @@ const LONGEST: f32 = 0.1;
 #[derive(Clone, Copy, Debug)]
 pub struct Motion {
     /// The camera.
-    pub camera: Camera,
+    pub camera: Viewpoint,
     /// Speed of flying, units/s.
     pub speed: f32,
     /// Walks instead of flying.
@@ -38,7 +37,7 @@ pub struct Motion {
 
 impl Motion {
     /// A flying camera.
-    pub fn new(camera: Camera) -> Self {
+    pub fn new(camera: Viewpoint) -> Self {
         Self {
             camera,
             speed: WALK_SPEED,
@@ -130,7 +129,7 @@ fn is_free(probe: &Probe, origin: Vec3, direction: Vec3, length: f32) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gui::egui::{self, RawInput};
+    use egui::RawInput;
     use relight::{Materials, Options, RelitWorld, sample};
 
     fn held(keys: &[Key]) -> InputState {
@@ -153,9 +152,9 @@ mod tests {
 
     #[test]
     fn flying_follows_the_view_at_its_speed() {
-        let mut motion = Motion::new(Camera {
+        let mut motion = Motion::new(Viewpoint {
             yaw: 90.0,
-            ..Camera::default()
+            ..Viewpoint::default()
         });
         assert!(motion.advance(&held(&[Key::W]), 0.05, None));
         let expected = Vec3::new(0.0, WALK_SPEED * 0.05, 0.0);
@@ -175,7 +174,8 @@ mod tests {
         };
         let world = RelitWorld::load(&files, &materials, sample::MAP, options).unwrap();
         let probe = Probe::new(&world);
-        let spawn = Camera::spawns(&world.bsp)[0];
+        let entities = world.bsp.entities();
+        let spawn = relight::viewpoints::spawn_views(&entities).next().unwrap();
         let mut motion = Motion::new(spawn);
         motion.walks = true;
         for _ in 0..60 {

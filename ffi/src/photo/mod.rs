@@ -1,0 +1,381 @@
+//! `rt_photo`: the scene stands still, a free camera, depth of field and exposure, pictures of any size.
+
+mod panel;
+pub mod panorama;
+
+use std::time::{Duration, Instant};
+
+use glam::{Mat3, Vec2, Vec3};
+use gui::egui::{self, Pos2};
+use gui::{Gui, Motion};
+use relight::probe::Probe;
+use relight::viewpoints::Viewpoint;
+use renderer_vk::api::{FreeCamera, Picture, RefDef, StillPicture, UiFrame};
+use renderer_vk::picture_files::{open_exr, png};
+use renderer_vk::{Renderer, Settings};
+
+use crate::menu::pointer::{self, Pointer};
+use crate::window::input::Input;
+
+/// Time without motion after which frames are averaged.
+const REST: Duration = Duration::from_millis(400);
+
+/// Kind of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// For the display.
+    Png,
+    /// Linear light.
+    Exr,
+    /// All around, for the display.
+    Panorama,
+}
+
+impl Kind {
+    /// File name extension, without the dot.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Png | Self::Panorama => "png",
+            Self::Exr => "exr",
+        }
+    }
+}
+
+/// What the player chose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// A picture is taken.
+    Take(Kind),
+    /// Photo mode ends.
+    Close,
+}
+
+/// A picture in progress.
+#[derive(Debug)]
+struct Job {
+    kind: Kind,
+    path: String,
+    size: (u32, u32),
+    samples: u32,
+    /// The current picture or view is requested.
+    requested: bool,
+    /// Finished views of a panorama.
+    faces: Vec<Picture>,
+}
+
+/// A finished picture: path and content.
+pub type Finished = (String, Vec<u8>);
+
+/// The lens and what belongs to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Lens {
+    /// Full vertical angle, degrees.
+    fov: f32,
+    /// Degrees, clockwise.
+    roll: f32,
+    /// Stops, added to `rt_exposure`.
+    exposure: f32,
+    blurs: bool,
+    /// Diameter, units.
+    aperture: f32,
+    /// Distance that is sharp, units.
+    focus: f32,
+}
+
+/// Photo mode.
+pub struct Photo {
+    gui: Gui,
+    pointer: Pointer,
+    motion: Motion,
+    lens: Lens,
+    first_lens: Lens,
+    first: Viewpoint,
+    /// Size over that of the window; 0: `custom`.
+    scale: u32,
+    custom: [u32; 2],
+    samples: u32,
+    panel: bool,
+    job: Option<Job>,
+    message: Option<String>,
+    moved: Instant,
+    last: Instant,
+    probe: Option<Probe>,
+}
+
+impl Photo {
+    /// Photo mode for a window of this size, from the game's view.
+    pub fn new(view: &RefDef, size: (u32, u32)) -> Self {
+        let [forward, ..] = view.view_axis;
+        let first = Viewpoint {
+            origin: view.view_origin,
+            yaw: forward.y.atan2(forward.x).to_degrees(),
+            pitch: (-forward.z).clamp(-1.0, 1.0).asin().to_degrees(),
+        };
+        let lens = Lens {
+            fov: view.fov_y,
+            roll: 0.0,
+            exposure: 0.0,
+            blurs: false,
+            aperture: 4.0,
+            focus: 256.0,
+        };
+        let now = Instant::now();
+        Self {
+            gui: Gui::new(),
+            pointer: Pointer::new(size),
+            motion: Motion::new(first),
+            lens,
+            first_lens: lens,
+            first,
+            scale: 2,
+            custom: [size.0, size.1],
+            samples: 256,
+            panel: true,
+            job: None,
+            message: None,
+            moved: now,
+            last: now,
+            probe: None,
+        }
+    }
+
+    /// Settings while it lasts; the console variables stay as they are.
+    pub fn put(&self, settings: &mut Settings) {
+        settings.rt_pause = true;
+        settings.rt_exposure += self.lens.exposure;
+        settings.rt_dof = self.lens.blurs;
+        settings.rt_aperture = self.lens.aperture;
+        settings.rt_focal_length = self.lens.focus;
+        settings.rt_accumulate = self.moved.elapsed() >= REST || self.job.is_some();
+        if self
+            .job
+            .as_ref()
+            .is_some_and(|job| job.kind == Kind::Panorama)
+        {
+            // one exposure for all views, and no light that would end at their edges
+            settings.rt_auto_exposure = false;
+            settings.rt_bloom = 0.0;
+            settings.rt_dof = false;
+        }
+    }
+
+    /// The camera: that of the next view of a panorama while it is requested, otherwise the free one.
+    pub fn camera(&self) -> FreeCamera {
+        let face = self
+            .job
+            .as_ref()
+            .filter(|job| job.kind == Kind::Panorama && !job.requested);
+        if let Some(axis) = face.and_then(|job| panorama::FACES.get(job.faces.len())) {
+            return FreeCamera {
+                origin: self.motion.camera.origin,
+                axis: *axis,
+                fov_y: 90.0,
+            };
+        }
+        let [forward, left, up] = self.motion.camera.axis();
+        let roll = Mat3::from_axis_angle(forward, self.lens.roll.to_radians());
+        FreeCamera {
+            origin: self.motion.camera.origin,
+            axis: [forward, roll * left, roll * up],
+            fov_y: self.lens.fov,
+        }
+    }
+
+    /// Whether a picture is in progress.
+    pub fn is_taking(&self) -> bool {
+        self.job.is_some()
+    }
+
+    /// Begins a picture.
+    pub fn take(&mut self, kind: Kind, path: String, window: (u32, u32)) {
+        let (width, height) = self.size(window);
+        let size = match kind {
+            Kind::Panorama => {
+                let side = panorama::side(width);
+                (side, side)
+            }
+            Kind::Png | Kind::Exr => (width, height),
+        };
+        self.message = None;
+        self.job = Some(Job {
+            kind,
+            path,
+            size,
+            samples: self.samples,
+            requested: false,
+            faces: Vec::new(),
+        });
+    }
+
+    /// Size of pictures, pixels.
+    fn size(&self, (width, height): (u32, u32)) -> (u32, u32) {
+        match self.scale {
+            0 => (self.custom[0].max(1), self.custom[1].max(1)),
+            scale => (width * scale, height * scale),
+        }
+    }
+
+    /// Shows a message in the panel.
+    pub fn say(&mut self, message: String) {
+        self.message = Some(message);
+    }
+
+    /// Requests what the picture in progress needs of the renderer, and takes what is finished.
+    ///
+    /// # Errors
+    /// A message for the player: the picture cannot be made.
+    pub fn advance(&mut self, renderer: &mut Renderer) -> Result<Option<Finished>, String> {
+        let Some(job) = &mut self.job else {
+            return Ok(None);
+        };
+        let made = Self::advance_job(job, renderer, self.motion.camera.yaw);
+        if !matches!(made, Ok(None)) {
+            self.job = None;
+            self.moved = Instant::now();
+        }
+        made
+    }
+
+    fn advance_job(
+        job: &mut Job,
+        renderer: &mut Renderer,
+        yaw: f32,
+    ) -> Result<Option<Finished>, String> {
+        if !job.requested {
+            let radiance = job.kind == Kind::Exr;
+            renderer.request_still(job.samples, Some(job.size), radiance)?;
+            job.requested = true;
+            return Ok(None);
+        }
+        let still = renderer.take_still().map_err(|e| e.to_string())?;
+        let Some(StillPicture { picture, radiance }) = still else {
+            return match renderer.still_progress() {
+                Some(_) => Ok(None),
+                None => Err(
+                    "the picture was not made: the device has not enough memory for this size"
+                        .into(),
+                ),
+            };
+        };
+        let bytes = match (job.kind, radiance) {
+            (Kind::Exr, Some(light)) => open_exr(&light, picture.width, picture.height),
+            (Kind::Panorama, _) => {
+                let width = (job.size.0 as f32 * std::f32::consts::PI) as u32;
+                job.faces.push(picture);
+                if job.faces.len() < panorama::FACES.len() {
+                    job.requested = false;
+                    return Ok(None);
+                }
+                let joined = panorama::join(&job.faces, width & !1, yaw);
+                png(&joined.ok_or("the views have different sizes")?)
+            }
+            (Kind::Png | Kind::Exr, _) => png(&picture),
+        };
+        let bytes = bytes.map_err(|e| e.to_string())?;
+        Ok(Some((job.path.clone(), bytes)))
+    }
+
+    /// Part of the picture in progress that is done, and what it is.
+    fn progress(&self, renderer: &Renderer) -> Option<(f32, String)> {
+        let job = self.job.as_ref()?;
+        let (done, wanted) = renderer.still_progress().unwrap_or((0, job.samples));
+        let part = done as f32 / wanted.max(1) as f32;
+        Some(match job.kind {
+            Kind::Panorama => {
+                let count = panorama::FACES.len();
+                let faces = job.faces.len();
+                let all = (faces as f32 + part) / count as f32;
+                (all, format!("view {} of {count}", (faces + 1).min(count)))
+            }
+            Kind::Png | Kind::Exr => (part, format!("{done} of {wanted} samples")),
+        })
+    }
+
+    /// Runs a frame: motion and panel; what to draw, and what the player chose.
+    pub fn frame(
+        &mut self,
+        events: &[Input],
+        relative: bool,
+        renderer: &Renderer,
+    ) -> (UiFrame, Vec<Action>) {
+        let size = renderer.size();
+        let input = self.pointer.input(events, relative, size);
+        let now = Instant::now();
+        let seconds = now.duration_since(self.last).as_secs_f32();
+        self.last = now;
+        let mut actions = Vec::new();
+        let mut clicked = None;
+        let mut turned = Vec2::ZERO;
+        let progress = self.progress(renderer);
+        let before = (self.motion.camera, self.lens);
+        let mut gui = std::mem::take(&mut self.gui);
+        let place = self.pointer.place();
+        let (ui, _) = gui.run(input, |context| {
+            actions.clear();
+            if context.input(|i| i.key_pressed(egui::Key::Tab)) {
+                self.panel = !self.panel;
+            }
+            if context.input(|i| i.key_pressed(egui::Key::Escape)) {
+                actions.push(Action::Close);
+            }
+            if self.panel || progress.is_some() {
+                self.show_panel(context, size, progress.as_ref(), &mut actions);
+            }
+            (clicked, turned) = area(context);
+            if self.panel {
+                pointer::draw(context, place);
+            }
+        });
+        if self.job.is_none() {
+            self.motion.turn(turned);
+            let moves = !gui.context().wants_keyboard_input();
+            if moves {
+                gui.context()
+                    .input(|input| self.motion.advance(input, seconds, None));
+            }
+            if let Some(at) = clicked {
+                self.focus_at(at, gui.context().content_rect(), renderer);
+            }
+        }
+        self.gui = gui;
+        if before != (self.motion.camera, self.lens) {
+            self.moved = now;
+        }
+        (ui, actions)
+    }
+
+    /// Focuses on the map's surface at a place of the window, points.
+    fn focus_at(&mut self, at: Pos2, screen: egui::Rect, renderer: &Renderer) {
+        let Some(world) = renderer.world() else {
+            return;
+        };
+        let probe = self.probe.get_or_insert_with(|| Probe::new(&world.relit));
+        let tan = (self.lens.fov.to_radians() * 0.5).tan();
+        let unit = (at - screen.center()) / (screen.height() * 0.5) * tan;
+        let camera = {
+            let [forward, left, up] = self.motion.camera.axis();
+            let roll = Mat3::from_axis_angle(forward, self.lens.roll.to_radians());
+            [forward, roll * left, roll * up]
+        };
+        let [forward, left, up] = camera;
+        let ray: Vec3 = (forward - left * unit.x - up * unit.y).normalize();
+        if let Some(met) = probe.surface(self.motion.camera.origin, ray) {
+            // distance of the plane of focus
+            self.lens.focus = (met.distance * ray.dot(forward)).clamp(1.0, 65536.0);
+            self.message = Some(format!("sharp at {:.0} units", self.lens.focus));
+        }
+    }
+}
+
+/// The picture behind the panel: where it was clicked, and the drag that turns the camera.
+fn area(context: &egui::Context) -> (Option<Pos2>, Vec2) {
+    let frame = egui::CentralPanel::default().frame(egui::Frame::NONE);
+    let shown = frame.show(context, |ui| {
+        let rect = ui.max_rect();
+        ui.interact(rect, ui.id().with("scene"), egui::Sense::click_and_drag())
+    });
+    let response = shown.inner;
+    let at = response.interact_pointer_pos();
+    let by = response.drag_delta();
+    (at.filter(|_| response.clicked()), Vec2::new(by.x, by.y))
+}
