@@ -9,7 +9,7 @@ use crate::engine::{self, Engine, valid_path_to_write};
 use crate::failure::Failure;
 use crate::menu::Menu;
 use crate::menu::pointer::keys_of_word;
-use crate::photo::Photo;
+use crate::photo::{Kind, Photo};
 use crate::presets::{self, Trial};
 use crate::session::{self, Front, with_renderer};
 use crate::window;
@@ -260,22 +260,41 @@ unsafe extern "C" fn menu() {
     });
 }
 
-/// Begins photo mode, or ends it.
+/// Begins photo mode, or ends it; with a word: takes a picture in it.
 unsafe extern "C" fn photo() {
-    print_lines(|renderer, front, _| {
-        if front.photo.take().is_some() {
-            renderer.cancel_still();
-            window::input::end();
-            return Vec::new();
-        }
-        match front.world_view {
-            Some(view) if front.settings.rt && renderer.world().is_some() => {
-                front.menu = None;
-                front.photo = Some(Photo::new(&view, renderer.size()));
-                window::input::begin();
+    print_lines(|renderer, front, arguments| {
+        let chosen = match arguments.get(1..).unwrap_or_default() {
+            [] => None,
+            [kind] => Some((Kind::of(kind), Ok(None))),
+            [kind, samples] => Some((Kind::of(kind), samples.parse().map(Some))),
+            _ => Some((None, Ok(None))),
+        };
+        match (chosen, &mut front.photo) {
+            (Some((Some(kind), Ok(samples))), Some(photo)) => {
+                photo.ask(kind, samples);
                 Vec::new()
             }
-            _ => vec!["rt_photo needs the traced look: set r_rt 1 and start a map first".into()],
+            (Some((Some(_), Ok(_))), None) => {
+                vec!["give rt_photo first: it holds the scene".into()]
+            }
+            (Some(_), _) => vec!["usage: rt_photo, then rt_photo png|exr|360 [SAMPLES]".into()],
+            (None, Some(_)) => {
+                renderer.cancel_still();
+                front.photo = None;
+                window::input::end();
+                Vec::new()
+            }
+            (None, None) => match front.world_view {
+                Some(view) if front.settings.rt && renderer.world().is_some() => {
+                    front.menu = None;
+                    front.photo = Some(Photo::new(&view, renderer.size()));
+                    window::input::begin();
+                    Vec::new()
+                }
+                _ => {
+                    vec!["rt_photo needs the traced look: set r_rt 1 and start a map first".into()]
+                }
+            },
         }
     });
 }

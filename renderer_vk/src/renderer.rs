@@ -328,6 +328,11 @@ impl Renderer {
             return Err(Error::NoWorld);
         }
         self.queue_overlay();
+        if self.hides_overlay && !wants_world {
+            // a model in a menu or in the game's display
+            self.scene.clear();
+            return Ok(());
+        }
         let wants_traced = match def.look {
             Some(look) => look == Look::Traced,
             None => self.settings.rt,
@@ -390,7 +395,7 @@ impl Renderer {
         self.held.camera = camera;
     }
 
-    /// Leaves out 2D pictures, such as a game's display of health and ammunition.
+    /// Leaves out 2D pictures and models outside of the world, such as a game's display of health and ammunition.
     pub fn hide_overlay(&mut self, hide: bool) {
         self.hides_overlay = hide;
     }

@@ -32,6 +32,16 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// The kind of a word of the command.
+    pub fn of(word: &str) -> Option<Self> {
+        match word.to_ascii_lowercase().as_str() {
+            "png" => Some(Self::Png),
+            "exr" => Some(Self::Exr),
+            "360" => Some(Self::Panorama),
+            _ => None,
+        }
+    }
+
     /// File name extension, without the dot.
     pub fn extension(self) -> &'static str {
         match self {
@@ -96,6 +106,8 @@ pub struct Photo {
     samples: u32,
     panel: bool,
     job: Option<Job>,
+    /// A picture requested by the command.
+    asked: Option<Kind>,
     message: Option<String>,
     moved: Instant,
     last: Instant,
@@ -132,6 +144,7 @@ impl Photo {
             samples: 256,
             panel: true,
             job: None,
+            asked: None,
             message: None,
             moved: now,
             last: now,
@@ -184,6 +197,12 @@ impl Photo {
     /// Whether a picture is in progress.
     pub fn is_taking(&self) -> bool {
         self.job.is_some()
+    }
+
+    /// Requests a picture, as the panel does; `samples`: those of this and later ones.
+    pub fn ask(&mut self, kind: Kind, samples: Option<u32>) {
+        self.samples = samples.map_or(self.samples, |samples| samples.clamp(1, 65536));
+        self.asked = Some(kind);
     }
 
     /// Begins a picture.
@@ -327,6 +346,7 @@ impl Photo {
             }
         });
         if self.job.is_none() {
+            actions.extend(self.asked.take().map(Action::Take));
             self.motion.turn(turned);
             let moves = !gui.context().wants_keyboard_input();
             if moves {

@@ -6,7 +6,6 @@ use tests::maps::HERE;
 
 for_every_engine!(
     presets_set_what_decides_about_cost,
-    a_menu_is_drawn_over_the_game_and_closes_without_a_trace,
     a_report_has_what_developers_ask_for_and_nothing_personal,
 );
 
@@ -40,6 +39,7 @@ fn presets_set_what_decides_about_cost() {
     engine.assert_clean();
 }
 
+#[test]
 fn a_menu_is_drawn_over_the_game_and_closes_without_a_trace() {
     let mut engine = engine_in_map();
     let view = View::new(HERE, 30.0);
@@ -54,12 +54,11 @@ fn a_menu_is_drawn_over_the_game_and_closes_without_a_trace() {
     let alike = relight::compare::compare(&before, &open).unwrap();
     assert!(alike.ssim < 0.97, "no menu: {alike:?}");
     // keys along the widgets, and enter: a setting changes
-    for _ in 0..30 {
-        for key in ["down", "enter"] {
-            engine.command(&format!("rt_menu {key}")).unwrap();
-            engine.picture(&view).unwrap();
-            engine.picture(&view).unwrap();
-        }
+    for _ in 0..12 {
+        engine.command("rt_menu down").unwrap();
+        engine.picture(&view).unwrap();
+        engine.command("rt_menu enter").unwrap();
+        engine.picture(&view).unwrap();
         if cvars.map(|name| engine.cvar(name)).as_slice() != values {
             break;
         }
@@ -82,6 +81,49 @@ fn a_menu_is_drawn_over_the_game_and_closes_without_a_trace() {
     let alike = relight::compare::compare(&before, &after).unwrap();
     assert!(alike.ssim > 0.9999, "{alike:?}");
     assert!(ask(&mut engine, "rt_menu sideways").contains("usage: rt_menu"));
+    engine.assert_clean();
+}
+
+#[test]
+fn photos_of_each_kind_are_written_while_the_game_goes_on() {
+    let mut engine = engine_in_map();
+    let view = View::new(HERE, 30.0);
+    assert!(ask(&mut engine, "rt_photo").contains("set r_rt 1"));
+    engine.set("r_rt", "1");
+    engine.picture(&view).unwrap();
+    assert!(ask(&mut engine, "rt_photo png").contains("give rt_photo first"));
+    let before = engine.cvar("rt_exposure");
+    engine.command("rt_photo").unwrap();
+    engine.picture(&view).unwrap();
+    assert!(ask(&mut engine, "rt_photo bmp").contains("usage: rt_photo"));
+    let (width, height) = (view.width as u32, view.height as u32);
+    for (word, file, wanted) in [
+        ("png 2", "photo0000.png", Some((2 * width, 2 * height))),
+        ("exr 2", "photo0001.exr", Some((2 * width, 2 * height))),
+        ("360 1", "photo0002.png", None),
+    ] {
+        engine.command(&format!("rt_photo {word}")).unwrap();
+        let path = format!("screenshots/{file}");
+        for _ in 0..200 {
+            engine.picture(&view).unwrap();
+            if engine.read_file(&path).is_some() {
+                break;
+            }
+        }
+        let bytes = engine.read_file(&path).expect(&path);
+        let picture = image::load_from_memory(&bytes).unwrap();
+        let size = (picture.width(), picture.height());
+        match wanted {
+            Some(wanted) => assert_eq!(size, wanted, "{word}"),
+            None => assert!(size.0.abs_diff(2 * size.1) <= 2, "{word}: {size:?}"),
+        }
+        let light = picture.to_rgb32f();
+        let mean = light.iter().sum::<f32>() / light.len() as f32;
+        assert!(mean > 0.005, "{word}: {mean}");
+    }
+    engine.command("rt_photo").unwrap();
+    engine.picture(&view).unwrap();
+    assert_eq!(engine.cvar("rt_exposure"), before);
     engine.assert_clean();
 }
 
