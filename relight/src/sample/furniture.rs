@@ -25,7 +25,7 @@ const LANTERNS: [(Vec3, f32); 5] = [
 
 /// Values and colours of the lamps, as in the script.
 const WARM: (f32, Vec3) = (7000.0, Vec3::new(1.0, 0.62, 0.28));
-const TEAL: (f32, Vec3) = (1500.0, Vec3::new(0.12, 0.85, 1.0));
+const TEAL: (f32, Vec3) = (2000.0, Vec3::new(0.12, 0.85, 1.0));
 const ROSE: (f32, Vec3) = (700.0, Vec3::new(1.0, 0.45, 0.3));
 /// The sky of the script, as a surface of that value: half of it comes through coloured glass.
 const SKY: (f32, Vec3) = (30.0, Vec3::new(0.85, 0.85, 1.0));

@@ -98,7 +98,11 @@ fn arcade(scene: &mut Scene, s: &Shaders, side: f32) {
             (24.0, 124.0, COLUMN),
         ] {
             let (mins, maxs) = box_at(half, low, high);
-            let ends = if low > 50.0 { face::BELOW } else { face::ABOVE };
+            let ends = if low > 50.0 {
+                face::BELOW | face::ABOVE
+            } else {
+                face::ABOVE
+            };
             scene.block(s.marble, mins, maxs, face::SIDES | ends);
         }
         scene.column(s.fluted, foot + z(18.0), ARCADE, 98.0);
@@ -235,7 +239,7 @@ fn shell(scene: &mut Scene, s: &Shaders) {
         );
     }
     let arch = Vec3::new(LENGTH, 0.0, spring);
-    soffit(scene, s, arch + x(12.0), y(-1.0), x(24.0), open);
+    soffit(scene, s, arch + x(12.0), y(-1.0), x(-24.0), open);
     let rest = tall - spring - ABOVE_ARCH;
     for (face, along) in [(x(0.0), y(-1.0)), (x(24.0), y(1.0))] {
         spandrel(scene, s, arch + face, along, open, ABOVE_ARCH);
@@ -280,12 +284,34 @@ fn terrace(scene: &mut Scene, s: &Shaders) {
     let middle = Vec3::new((LENGTH + 24.0 + TERRACE) * 0.5, 0.0, 190.0);
     let half = Vec3::new((TERRACE - LENGTH - 24.0) * 0.5, 240.0, 210.0);
     for (out, right, up) in [
-        (x(half.x), y(half.y), z(half.z)),
+        (x(half.x), y(-half.y), z(half.z)),
         (y(half.y), x(half.x), z(half.z)),
         (y(-half.y), x(-half.x), z(half.z)),
         (z(half.z), y(half.y), x(half.x)),
     ] {
         scene.plate(s.sky, middle + out, right, up, false);
+    }
+    // what keeps players in: around the terrace and above everything
+    let (west, east, side, top) = (LENGTH, TERRACE, 240.0, SPRING + VAULT);
+    for (mins, maxs) in [
+        (
+            Vec3::new(east, -side, 0.0),
+            Vec3::new(east + 16.0, side, top),
+        ),
+        (
+            Vec3::new(west, side, 0.0),
+            Vec3::new(east, side + 16.0, top),
+        ),
+        (
+            Vec3::new(west, -side - 16.0, 0.0),
+            Vec3::new(east, -side, top),
+        ),
+        (
+            Vec3::new(-west, -WIDTH, top),
+            Vec3::new(east, WIDTH, top + 16.0),
+        ),
+    ] {
+        scene.map.add_box_brush(s.sky, mins, maxs);
     }
 }
 

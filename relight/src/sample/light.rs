@@ -12,7 +12,7 @@ use crate::occluders::Occluders;
 /// Direction to the sun of the script: 65 degrees clockwise from +x, 36 up.
 pub(super) const SUN: Vec3 = Vec3::new(0.341_91, -0.733_22, 0.587_79);
 /// Colour and value of the sun of the script.
-const SUN_LIGHT: Vec3 = Vec3::new(280.0, 224.0, 154.0);
+const SUN_LIGHT: Vec3 = Vec3::new(340.0, 272.0, 187.0);
 /// Offsets of the sun's direction, for soft shadows: about its radius.
 const SUN_OFFSETS: [Vec3; 4] = [
     Vec3::new(0.009, 0.003, 0.003),

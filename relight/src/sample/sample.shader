@@ -63,7 +63,7 @@ sample/lamp_teal
 {
 	surfaceparm nolightmap
 	q3map_lightRGB 0.12 0.85 1
-	q3map_surfacelight 1500
+	q3map_surfacelight 2000
 	{
 		map sample/lamp_teal.tga
 		rgbGen wave sin 0.8 0.2 0.5 0.12
@@ -185,7 +185,7 @@ sample/sky
 	surfaceparm sky
 	surfaceparm noimpact
 	surfaceparm nolightmap
-	q3map_sunExt 1 0.8 0.55 280 -65 36 0.7 8
+	q3map_sunExt 1 0.8 0.55 340 -65 36 0.7 8
 	q3map_skylight 60 3
 	skyParms - 384 -
 	{

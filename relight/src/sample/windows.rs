@@ -87,6 +87,17 @@ pub(super) fn build(scene: &mut Scene, s: &Shaders) {
             at + sill,
             face::SIDES | face::BELOW | face::ABOVE,
         );
+        // nobody passes, whether through glass or bars
+        let filled = if is_glazed(index) {
+            s.glass[0]
+        } else {
+            s.grate
+        };
+        scene.map.add_box_brush(
+            filled,
+            Vec3::new(bay - half, GLASS_Y - 2.0, low),
+            Vec3::new(bay + half, GLASS_Y, high),
+        );
         if is_glazed(index) {
             glass(scene, s, bay);
         } else {
