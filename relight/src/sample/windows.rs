@@ -87,7 +87,7 @@ pub(super) fn build(scene: &mut Scene, s: &Shaders) {
             at + sill,
             face::SIDES | face::BELOW | face::ABOVE,
         );
-        // nobody passes, whether through glass or bars
+        // nobody passes, whether through glass or bars; behind the panes, whose images are not the brush's
         let filled = if is_glazed(index) {
             s.glass[0]
         } else {
@@ -95,8 +95,8 @@ pub(super) fn build(scene: &mut Scene, s: &Shaders) {
         };
         scene.map.add_box_brush(
             filled,
-            Vec3::new(bay - half, GLASS_Y - 2.0, low),
-            Vec3::new(bay + half, GLASS_Y, high),
+            Vec3::new(bay - half, GLASS_Y - 3.0, low),
+            Vec3::new(bay + half, GLASS_Y - 1.0, high),
         );
         if is_glazed(index) {
             glass(scene, s, bay);
