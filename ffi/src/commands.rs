@@ -1,5 +1,7 @@
 //! Console commands.
 
+pub mod benchmark;
+
 use crate::boundary::entry;
 use crate::capture::{Format, Shot, StillShot, free_path, still_arguments};
 use crate::costs::Report;
@@ -51,6 +53,7 @@ static COMMANDS: &[(&CStr, Function)] = &[
     (c"rt_preset", preset),
     (c"rt_menu", menu),
     (c"rt_photo", photo),
+    (c"rt_benchmark", benchmark::run),
     (c"report", report),
 ];
 
@@ -305,6 +308,10 @@ fn begin_trial(renderer: &Renderer, front: &mut Front) -> (Option<&'static Prese
         let line = "rt_preset auto measures the traced look: set r_rt 1 and start a map first";
         return (None, vec![line.into()]);
     }
+    if front.benchmark.is_some() {
+        let line = format!("rt_preset auto: {}", benchmark::IN_PROGRESS);
+        return (None, vec![line]);
+    }
     let refresh = window::current().map_or(0, |window| window.refresh_rate());
     let software = renderer.device_info().software;
     let (trial, first) = Trial::new(refresh, software, Instant::now());
@@ -347,14 +354,18 @@ unsafe extern "C" fn report() {
     });
 }
 
+/// The file of a camera path of a name.
+fn path_file(name: &str) -> String {
+    format!("paths/{}.txt", name.strip_suffix(".txt").unwrap_or(name))
+}
+
 unsafe extern "C" fn path() {
     entry(|| {
         let Some(engine) = engine::current() else {
             return Ok(());
         };
         let arguments = engine.arguments();
-        let name = arguments.get(1).map_or("path", String::as_str);
-        let file = format!("paths/{}.txt", name.strip_suffix(".txt").unwrap_or(name));
+        let file = path_file(arguments.get(1).map_or("path", String::as_str));
         if valid_path_to_write(&file).is_none() {
             engine.say(&format!("rt_path: {file}: {NOT_A_NAME}\n"));
             return Ok(());

@@ -27,6 +27,7 @@
 //! `front_ends` lists the front ends. `docs/src/port.md` explains how to add one.
 
 pub mod abi;
+mod benchmark;
 mod boundary;
 #[cfg(test)]
 mod boundary_tests;

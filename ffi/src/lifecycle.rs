@@ -247,6 +247,8 @@ pub fn end(ending: Ending) {
         front.captures.video = None;
         let mut outbox = Outbox::default();
         outbox.lines.extend(abandon_still(renderer, front));
+        let back = matches!(ending, Ending::KeepAll | Ending::KeepWindow);
+        commands::benchmark::unload(renderer, front, back, &mut outbox);
         take_captures(renderer, front, &mut outbox).map(|()| outbox)
     }) {
         deliver(engine, outbox);
@@ -264,6 +266,10 @@ pub fn end(ending: Ending) {
         session.front.photo = None;
         session.front.world_view = None;
         session.front.trial = None;
+        // after a failure nothing can be measured
+        if session.renderer.is_none() {
+            session.front.benchmark = None;
+        }
         session.front.clip_region = None;
         session.front.captures.clear();
         session.front.cinematics.clear();
@@ -403,6 +409,7 @@ fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Fa
         .extend(crate::speeds::lines(&front.settings, &stats, renderer));
     finish_still(renderer, front, &mut outbox)?;
     go_on_with_trial(renderer, front, &mut outbox);
+    commands::benchmark::go_on(renderer, front, &mut outbox)?;
     let answers = (front.questions).answer(renderer, &front.settings, Instant::now());
     outbox.lines.extend(answers.lines);
     let files = answers.files.into_iter();

@@ -338,6 +338,13 @@ pub unsafe extern "C" fn render_scene(from: *const refdef_t) {
                 if let Some((_, lines)) = &mut front.path {
                     lines.push_str(&PathPoint::of(&view).line());
                 }
+                // a path is drawn in place of the game's view
+                if let Some(benchmark) = &mut front.benchmark
+                    && !benchmark.sees()
+                {
+                    renderer.clear_scene();
+                    return Ok(());
+                }
             }
             renderer.render_scene(&view).map_err(Failure::from)
         })?;

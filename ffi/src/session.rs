@@ -5,6 +5,7 @@
 //! an error of the engine inside a service that the outer call used, so that the outer call will never return. The
 //! taken state is then leaked, and its window is replaced.
 
+use crate::benchmark::Benchmark;
 use crate::capture::Captures;
 use crate::cinematics::Cinematics;
 use crate::costs::Questions;
@@ -55,6 +56,8 @@ pub struct Front {
     pub menu_keys: Vec<Input>,
     /// `rt_preset auto`, while it measures.
     pub trial: Option<Trial>,
+    /// `rt_benchmark`, while it measures.
+    pub benchmark: Option<Benchmark>,
     /// The camera path being recorded by `rt_path`: its file and its lines.
     pub path: Option<(String, String)>,
     /// Videos of materials.

@@ -110,11 +110,8 @@ pub struct Costs {
 }
 
 impl Costs {
-    /// Sums passes by name.
-    pub(crate) fn passes(
-        timings: &[(String, f32)],
-        rays: impl Fn(&str) -> Option<u64>,
-    ) -> Vec<PassCost> {
+    /// Sums passes by name; `rays` knows the number of a pass's rays.
+    pub fn passes(timings: &[(String, f32)], rays: impl Fn(&str) -> Option<u64>) -> Vec<PassCost> {
         let mut passes: Vec<PassCost> = Vec::new();
         for (name, ms) in timings {
             match passes.iter_mut().find(|pass| pass.name == *name) {

@@ -1,12 +1,13 @@
-//! What players ask for in the console: presets, reports.
+//! What players ask for in the console: presets, reports, benchmarks.
 
 use super::support::{engine_in_map, for_every_engine, image_of, text_of};
 use tests::engine::{Engine, View};
-use tests::maps::HERE;
+use tests::maps::{HERE, ROOMS};
 
 for_every_engine!(
     presets_set_what_decides_about_cost,
     a_report_has_what_developers_ask_for_and_nothing_personal,
+    a_benchmark_measures_a_path_and_says_what_is_wrong,
 );
 
 /// Runs a command and draws a frame; what was printed.
@@ -202,4 +203,125 @@ fn a_report_has_what_developers_ask_for_and_nothing_personal() {
         "{printed}"
     );
     engine.assert_clean();
+}
+
+/// Draws frames until something printed contains `end`; what was printed.
+fn play_until(engine: &mut Engine, end: &str) -> String {
+    let mut printed = String::new();
+    for _ in 0..200 {
+        engine.picture(&View::new(HERE, 30.0)).unwrap();
+        printed += &text_of(&engine.take_messages());
+        if printed.contains(end) {
+            return printed;
+        }
+    }
+    panic!("no {end:?} in {printed}");
+}
+
+/// The result in a file.
+fn result_of(engine: &Engine, path: &str) -> serde_json::Value {
+    let bytes = engine.read_file(path).expect(path);
+    serde_json::from_slice(&bytes).expect("JSON")
+}
+
+fn a_benchmark_measures_a_path_and_says_what_is_wrong() {
+    let mut engine = engine_in_map();
+    let shown = engine.picture(&View::new(HERE, 30.0)).unwrap();
+    engine.take_messages();
+    let says = |engine: &mut Engine, command: &str, part: &str| {
+        engine.command(command).unwrap();
+        let printed = text_of(&engine.take_messages());
+        assert!(printed.contains(part), "{command}: {printed}");
+    };
+    says(&mut engine, "rt_benchmark a b", "usage: rt_benchmark");
+    says(&mut engine, "rt_benchmark stop", "none is measuring");
+    says(
+        &mut engine,
+        "rt_benchmark lost",
+        "there is no paths/lost.txt",
+    );
+    says(&mut engine, "rt_benchmark demo a;quit", "letters, digits");
+    for (name, text, part) in [
+        ("empty", "# nothing\n", "has no frames"),
+        ("bad", "0 1 2 3\n", "line 1"),
+    ] {
+        engine.insert_file(&format!("paths/{name}.txt"), text.into());
+        says(&mut engine, &format!("rt_benchmark {name}"), part);
+    }
+
+    let lines = (0..5).map(|i| format!("{} -100 0 40 0 {} 0 90 74\n", i * 16, i * 30));
+    engine.insert_file("paths/short.txt", lines.collect::<String>().into());
+    for number in 0..2 {
+        says(&mut engine, "rt_benchmark short", "benchmark: 5 frames");
+        says(
+            &mut engine,
+            "rt_benchmark short",
+            "rt_benchmark stop ends it",
+        );
+        // nothing is measured while a menu hides the map
+        engine.begin_frame(0).unwrap();
+        engine.end_frame().unwrap();
+        let printed = play_until(&mut engine, "frames/s");
+        let path = format!("relight/benchmark-rooms-000{number}.json");
+        assert!(printed.contains(&format!("Wrote {path}")), "{printed}");
+        let version = env!("CARGO_PKG_VERSION");
+        assert!(
+            printed.contains(&format!("Relight {version}, ")),
+            "{printed}"
+        );
+        assert!(
+            printed.contains(", rooms, 320x240, classic look: "),
+            "{printed}"
+        );
+        let result = result_of(&engine, &path);
+        assert_eq!(result["frames"], 5);
+        assert_eq!(result["map"], "rooms");
+        assert_eq!(result["route"], "paths/short.txt");
+        assert_eq!(result["look"], "classic");
+        for times in ["gpu_ms", "frame_ms"] {
+            let time = |part: &str| result[times][part].as_f64().expect(part);
+            assert!(time("median") > 0.0 && time("median") <= time("p95"));
+            assert!(time("p5") <= time("median") && time("p99") <= time("worst"));
+        }
+        assert!(!result["passes"].as_object().unwrap().is_empty());
+        assert!(result["memory"]["textures"].as_u64().unwrap() > 0);
+    }
+    // the game's view is back
+    assert_eq!(engine.picture(&View::new(HERE, 30.0)).unwrap(), shown);
+
+    says(&mut engine, "rt_benchmark", "benchmark: 240 frames");
+    says(&mut engine, "rt_benchmark stop", "stopped");
+    says(&mut engine, "rt_benchmark", "benchmark: 240 frames");
+    engine.start_map(ROOMS).unwrap();
+    let printed = text_of(&engine.take_messages());
+    assert!(
+        printed.contains("the map ended after 0 of 240"),
+        "{printed}"
+    );
+    engine.shutdown(false).unwrap();
+    engine.begin_registration().unwrap();
+    says(&mut engine, "rt_benchmark", "start a map first");
+    engine.assert_clean();
+}
+
+#[test]
+fn a_benchmark_of_a_demo_begins_with_its_map_and_ends_with_it() {
+    let mut engine = engine_in_map();
+    engine.take_messages();
+    engine.command("rt_benchmark demo one").unwrap();
+    // the stand-in plays none; the next map is the demo's
+    let asked = engine.violations();
+    assert!(asked.iter().any(|v| v.contains("demo one")), "{asked:?}");
+    engine.start_map(ROOMS).unwrap();
+    for _ in 0..15 {
+        engine.picture(&View::new(HERE, 30.0)).unwrap();
+    }
+    engine.start_map(ROOMS).unwrap();
+    let printed = text_of(&engine.take_messages());
+    assert!(printed.contains("frames/s"), "{printed}");
+    let result = result_of(&engine, "relight/benchmark-rooms-0000.json");
+    assert_eq!(
+        (&result["frames"], &result["route"]),
+        (&5.into(), &"demo one".into())
+    );
 }

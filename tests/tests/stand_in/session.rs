@@ -132,6 +132,7 @@ fn cvars_and_commands_come_and_go() {
         "gfxinfo",
         "rt_screenshot",
         "rt_stats",
+        "rt_benchmark",
     ] {
         assert!(commands.iter().any(|c| c == name), "{name} is no command");
     }
