@@ -60,7 +60,10 @@ impl Source {
         let mut front = relight::MemoryFiles::new();
         let stem = name.strip_suffix(".bsp").unwrap_or(&name);
         front.insert(&format!("{stem}.lights"), bytes)?;
-        Ok((Arc::new(Overlay { front, back: files }), name))
+        // the renderer takes an `Arc`; no other thread gets it
+        #[allow(clippy::arc_with_non_send_sync)]
+        let files = Arc::new(Overlay { front, back: files });
+        Ok((files, name))
     }
 
     /// Folders and files whose changes concern the map.

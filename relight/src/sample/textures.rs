@@ -301,8 +301,11 @@ pub(super) fn grate_is_solid(st: Vec2) -> bool {
     grate(st - st.floor()).1 > 0.5
 }
 
+/// The texel at a place of a texture.
+type Recipe = Box<dyn Fn(Vec2) -> Texel + Sync>;
+
 /// The images: names, sides, and what shows where.
-fn recipes() -> Vec<(&'static str, usize, Box<dyn Fn(Vec2) -> Texel + Sync>)> {
+fn recipes() -> Vec<(&'static str, usize, Recipe)> {
     let [amber, ruby, azure] = GLASS;
     let plain = |color: Vec3, alpha: f32| move |_: Vec2| (color, alpha);
     vec![

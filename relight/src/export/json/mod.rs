@@ -1,5 +1,5 @@
-//! JSON of everything in a relit map, for programs: `docs/src/maps/json.md` and
-//! `docs/src/maps/map-json.schema.json` describe it.
+//! JSON of everything in a relit map, for programs: `docs/src/json.md` and
+//! `docs/src/map-json.schema.json` describe it.
 //!
 //! The document holds the typed map without loss ([`read_map`] gives it back), and what relighting found: materials,
 //! lights, and which lights matter where.

@@ -249,7 +249,7 @@ fn conforms(value: &Value, schema: &Value, root: &Value, path: &str) {
 
 #[test]
 fn documents_are_what_the_schema_says() {
-    let schema = include_str!("../../../../docs/src/maps/map-json.schema.json");
+    let schema = include_str!("../../../../docs/src/map-json.schema.json");
     let schema: Value = serde_json::from_str(schema).unwrap();
     let mut layered = map();
     layered.format = Format::Rbsp;
