@@ -185,6 +185,7 @@ fn make_renderer(
         // Off without a session.
         vsync: session::with(|session| session.front.settings.swap_interval != 0)
             .unwrap_or_default(),
+        hdr: session::with(|session| session.front.settings.hdr).unwrap_or_default(),
         pipeline_cache: cache_folder.map(|folder| folder.join("pipelines.cache")),
     };
     Renderer::new(options).map_err(|e| e.to_string())

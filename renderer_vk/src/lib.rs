@@ -35,8 +35,8 @@ pub use gpu::{
 };
 pub use renderer::{CpuTimes, FrameStats, Renderer, RendererOptions, map_options, probe};
 pub use settings::{
-    Anaglyph, DebugOutput, DenoiserChoice, LightSelection, MapLightChoice, ModelShadows, Settings,
-    TextureMode, TracerChoice,
+    Anaglyph, DebugOutput, DenoiserChoice, HdrChoice, LightSelection, MapLightChoice, ModelShadows,
+    Settings, TextureMode, TracerChoice,
 };
 pub use statistics::{Costs, MemoryPurpose, PassCost};
 pub use stereo::Eye;

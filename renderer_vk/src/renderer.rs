@@ -18,12 +18,12 @@ use crate::assets::Assets;
 use crate::error::Error;
 use crate::frame::Item;
 use crate::gpu::{
-    ColorMask, Device, DeviceInfo, DeviceOptions, FrameRing, SurfaceSource, Swapchain,
+    ColorMask, Device, DeviceInfo, DeviceOptions, Encoding, FrameRing, SurfaceSource, Swapchain,
     SwapchainDesc, Window, give_back_freed_memory,
 };
 use crate::raster::{DrawList, Flares, Overlay, Present, Raster, UiTextures};
 use crate::scene::{GatherInput, Scene};
-use crate::settings::{Anaglyph, Settings};
+use crate::settings::{Anaglyph, HdrChoice, Settings};
 use crate::stereo::Eye;
 use crate::targets::FrameTargets;
 use crate::trace::TraceLook;
@@ -51,6 +51,9 @@ pub struct RendererOptions {
     pub device: Option<String>,
     /// Wait for vertical blank.
     pub vsync: bool,
+    /// Output of more than white, where the window offers it. Without a window it is made all the same, for
+    /// [`read_presented`](Renderer::read_presented).
+    pub hdr: HdrChoice,
     /// File of the driver's pipeline cache between starts; `None` stores nothing.
     pub pipeline_cache: Option<std::path::PathBuf>,
 }
@@ -65,6 +68,7 @@ impl RendererOptions {
             validation: false,
             device: None,
             vsync: false,
+            hdr: HdrChoice::Off,
             pipeline_cache: None,
         }
     }
@@ -89,6 +93,8 @@ pub struct Renderer {
     present: Option<Present>,
     targets: FrameTargets,
     swapchain: Option<Swapchain>,
+    /// Encoding of the window.
+    encoding: Encoding,
     ring: FrameRing,
     device: Device,
     /// What the surface needs; dropped after the device.
@@ -168,12 +174,22 @@ impl Renderer {
                         width: options.width,
                         height: options.height,
                         vsync: options.vsync,
+                        wide: wide_encodings(options.hdr),
                     },
                 )?;
                 (device, Some(swapchain))
             }
             None => (Device::new(&device_options, SurfaceSource::Headless)?, None),
         };
+        let encoding = match &swapchain {
+            Some(swapchain) => swapchain.encoding(),
+            None => (wide_encodings(options.hdr).first().copied()).unwrap_or(Encoding::Srgb),
+        };
+        if options.hdr != HdrChoice::Off && encoding == Encoding::Srgb {
+            log::warn!(
+                "rt_hdr: this display or its driver offers no HDR here; the picture is as without rt_hdr"
+            );
+        }
         device.measure(!device.info().software);
         let targets = FrameTargets::new(&device, options.width, options.height)?;
         let present = match &swapchain {
@@ -195,6 +211,7 @@ impl Renderer {
             present,
             targets,
             swapchain,
+            encoding,
             ring: FrameRing::new(&device, 2)?,
             device,
             _window: owner,
@@ -426,6 +443,16 @@ impl Renderer {
 impl Drop for Renderer {
     fn drop(&mut self) {
         self.kept_pipelines.write(&self.device);
+    }
+}
+
+/// The encodings for a choice, the best first. HDR10 needs half the memory of scRGB.
+fn wide_encodings(choice: HdrChoice) -> &'static [Encoding] {
+    match choice {
+        HdrChoice::Off => &[],
+        HdrChoice::Any => &[Encoding::Hdr10, Encoding::ScRgb],
+        HdrChoice::Hdr10 => &[Encoding::Hdr10],
+        HdrChoice::ScRgb => &[Encoding::ScRgb],
     }
 }
 

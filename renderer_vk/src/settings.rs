@@ -10,7 +10,7 @@ mod value;
 use std::hash::Hasher;
 
 pub use choices::{
-    Anaglyph, DebugOutput, DenoiserChoice, LightSelection, MapLightChoice, ModelShadows,
+    Anaglyph, DebugOutput, DenoiserChoice, HdrChoice, LightSelection, MapLightChoice, ModelShadows,
     TextureMode, TracerChoice,
 };
 pub use presets::{PRESETS, Preset};
@@ -179,6 +179,9 @@ settings! { variables {
     rt_exposure: f32 = "rt_exposure", "0", ARCHIVE, kept(-16.0, 16.0), Frame, GoesOn, "Exposure in stops, added to the automatic one.";
     rt_auto_exposure: bool = "rt_autoExposure", "1", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 adapts the exposure to the picture.";
     rt_bloom: f32 = "rt_bloom", "0.05", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "Part of the light that spreads around bright things; 0 none.";
+    hdr: HdrChoice = "rt_hdr", "0", ARCHIVE | LATCH, kept(0.0, 3.0), Frame, GoesOn, "Output for displays that are brighter than white: 0 none, 1 what the display offers, 2 HDR10, 3 scRGB.";
+    hdr_white: f32 = "rt_hdrWhite", "203", ARCHIVE, kept(80.0, 500.0), Frame, GoesOn, "Brightness of white with rt_hdr in cd/m2.";
+    hdr_peak: f32 = "rt_hdrPeak", "800", ARCHIVE, kept(200.0, 10000.0), Frame, GoesOn, "Brightest light with rt_hdr in cd/m2: that of the display.";
     rt_flashlight: bool = "rt_flashlight", "0", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "1 carries a lamp at the camera.";
     rt_light_scale: f32 = "rt_lightScale", "1", ARCHIVE, kept(0.0, 100.0), Frame, Restarts, "Multiplies every light of the map when it is traced.";
     rt_dlight_scale: f32 = "rt_dlightScale", "1", ARCHIVE, kept(0.0, 100.0), Frame, Restarts, "Multiplies lights of explosions, missiles and items when they are traced.";

@@ -31,8 +31,8 @@ impl FrameTargets {
     }
 
     /// Makes images anew whose settings have changed: multisampled with `r_ext_multisample` if nothing is traced, with
-    /// a stencil while shadow volumes are drawn. `format` is the colour format; only [`raster::COLOR_FORMAT`] supports
-    /// writes of compute and ray tracing shaders.
+    /// a stencil while shadow volumes are drawn. `format` is the colour format; only [`raster::COLOR_FORMAT`] and
+    /// [`raster::WIDE_FORMAT`] support writes of compute and ray tracing shaders.
     ///
     /// # Errors
     /// The device is out of memory.
@@ -119,7 +119,7 @@ fn color_image(
 ) -> Result<Image, gpu::Error> {
     // Without the usage of sampled textures: the validation layer assumes that every draw reads all sampled textures,
     // and would report a target among them as a hazard.
-    let usage = if format == raster::COLOR_FORMAT {
+    let usage = if [raster::COLOR_FORMAT, raster::WIDE_FORMAT].contains(&format) {
         ImageUsage::COLOR | ImageUsage::STORAGE
     } else {
         ImageUsage::COLOR

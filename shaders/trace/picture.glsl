@@ -17,11 +17,14 @@ vec3 picture_load(ivec2 pixel) {
 
 // Writes a display-encoded colour to the target. In anaglyph stereo each eye writes its own channels.
 void target_store(ivec2 target, vec3 color) {
+    bool wide = VIEW.target.peak > 1.0;
     if (VIEW.target.channels != 7u) {
         bvec3 written = notEqual(uvec3(VIEW.target.channels) & uvec3(1, 2, 4), uvec3(0));
-        color = mix(imageLoad(images_rgba8[VIEW.target.image], target).rgb, color, written);
+        vec3 before = wide ? imageLoad(images_rgba16f[VIEW.target.image], target).rgb : imageLoad(images_rgba8[VIEW.target.image], target).rgb;
+        color = mix(before, color, written);
     }
-    imageStore(images_rgba8[VIEW.target.image], target, vec4(color, 1.0));
+    if (wide) imageStore(images_rgba16f[VIEW.target.image], target, vec4(color, 1.0));
+    else imageStore(images_rgba8[VIEW.target.image], target, vec4(color, 1.0));
 }
 
 #endif

@@ -13,4 +13,10 @@ vec3 tone_curve(vec3 x) {
     return mix(shoulder, x, lessThan(x, vec3(KNEE)));
 }
 
+// The same curve with a maximum of `peak`, for a display that shows more than white.
+vec3 tone_curve_to(vec3 x, float peak) {
+    vec3 shoulder = peak - (peak - KNEE) * exp(-(x - KNEE) / (peak - KNEE));
+    return mix(shoulder, x, lessThan(x, vec3(KNEE)));
+}
+
 #endif

@@ -28,5 +28,6 @@ void main() {
     vec3 radiance = picture_load(pixel);
     if (VIEW.post.bloom != 0) radiance = mix(radiance, bloom_at(pixel), VIEW.post.bloom_strength);
     radiance = max(radiance * exposure, 0.0);
-    target_store(target, encode_display(tone_curve(radiance)));
+    vec3 shown = VIEW.target.peak > 1.0 ? tone_curve_to(radiance, VIEW.target.peak) : tone_curve(radiance);
+    target_store(target, encode_display(shown));
 }

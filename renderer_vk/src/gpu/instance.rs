@@ -81,6 +81,11 @@ impl Instance {
         if debug_utils && extensions.iter().all(|e| **e != *ext::debug_utils::NAME) {
             extensions.push(ext::debug_utils::NAME.to_owned());
         }
+        // colour spaces of more than white, which a window may offer
+        let color_spaces = ext::swapchain_colorspace::NAME;
+        if window.is_some() && has(&available, color_spaces) {
+            extensions.push(color_spaces.to_owned());
+        }
         let validates = validation && has_validation_layer(&entry)?;
         let synchronization = validates && validates_synchronization(&entry);
         if synchronization {

@@ -68,7 +68,7 @@ pub use pipeline_cache::is_pipeline_cache;
 pub use ray_tracing::{HitGroup, RayTracingDesc, RayTracingPipeline};
 pub use recorder::Recorder;
 pub use select::{DeviceInfo, DeviceKind, RayTracingLimits};
-pub use swapchain::{Swapchain, SwapchainDesc};
+pub use swapchain::{Encoding, Swapchain, SwapchainDesc};
 pub use tlas::{Instance, Tlas};
 pub use window::{CreateSurface, Window};
 

@@ -33,7 +33,7 @@ pub use expected::{ExpectedWorld, expected_instance};
 pub use flares::{FlareTest, Flares, window_to_clip};
 pub use list::{DrawList, Statics};
 pub use overlay::{Overlay, Picture2d, overlay_instance};
-pub use present::Present;
+pub use present::{Display, Present};
 pub use shading::{PixelLights, StageContext};
 pub use target::Target;
 pub use ui::{UiMeshes, UiTextures};
@@ -52,6 +52,9 @@ use target::TargetKind;
 
 /// Format of the frame's colour image, unless the window shows it unchanged: then it has the window's format.
 pub const COLOR_FORMAT: Format = Format::Rgba8;
+
+/// Format of the frame's colour image for a window that shows more than white: display values, 1 is white.
+pub const WIDE_FORMAT: Format = Format::Rgba16F;
 
 /// Downward shift of 3D views, pixels: one step of the subpixel grid of 1/256. An edge may run through pixel centres,
 /// as under level cameras. In OpenGL, whose rows count from the bottom, such pixels belong to the triangle above the

@@ -3,8 +3,8 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::gpu::{
-    self, Access, Cull, DepthTest, Device, Format, GraphicsDesc, GraphicsPipeline, Image, Recorder,
-    Rendering, Viewport,
+    self, Access, Cull, DepthTest, Device, Encoding, Format, GraphicsDesc, GraphicsPipeline, Image,
+    Recorder, Rendering, Viewport,
 };
 
 #[repr(C)]
@@ -13,7 +13,22 @@ struct Parameters {
     image: u32,
     scale: f32,
     inverse_gamma: f32,
-    srgb_target: u32,
+    encoding: u32,
+    wide: u32,
+    white: f32,
+}
+
+/// How display values become values of the window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Display {
+    /// Each channel becomes `c^(1/gamma) * 2^overbright_bits`.
+    pub gamma: f32,
+    /// See `gamma`.
+    pub overbright_bits: u32,
+    /// Encoding of the window.
+    pub encoding: Encoding,
+    /// Brightness of white with an encoding of more than white, cd/m².
+    pub white: f32,
 }
 
 /// Presents a frame to targets of one format.
@@ -52,8 +67,8 @@ impl Present {
         self.format
     }
 
-    /// Records the copy of `frame` to `target`: each channel becomes `c^(1/gamma) * 2^overbright_bits`. Copies a frame
-    /// unchanged if it has the target's format and that is not [`super::COLOR_FORMAT`].
+    /// Records the copy of `frame` to `target`. Copies a frame unchanged if it has the target's format and that is
+    /// neither [`super::COLOR_FORMAT`] nor [`super::WIDE_FORMAT`].
     ///
     /// # Errors
     /// The device is out of memory.
@@ -62,10 +77,10 @@ impl Present {
         recorder: &mut Recorder,
         frame: &Image,
         target: &Image,
-        gamma: f32,
-        overbright_bits: u32,
+        display: Display,
     ) -> Result<(), gpu::Error> {
-        if frame.format() != super::COLOR_FORMAT {
+        let wide = frame.format() == super::WIDE_FORMAT;
+        if frame.format() != super::COLOR_FORMAT && !wide {
             let mut pass = recorder.pass("present", Access::TRANSFER, Access::TRANSFER)?;
             let all = |image: &Image| [0, 0, image.width() as i32, image.height() as i32];
             if all(frame) == all(target) && frame.format() == target.format() {
@@ -95,9 +110,17 @@ impl Present {
         pass.bind_graphics(&self.pipeline);
         pass.push(&Parameters {
             image: frame.storage_index(),
-            scale: (1 << overbright_bits.min(2)) as f32,
-            inverse_gamma: 1.0 / gamma.clamp(0.5, 3.0),
-            srgb_target: matches!(self.format, Format::Rgba8Srgb).into(),
+            scale: (1 << display.overbright_bits.min(2)) as f32,
+            inverse_gamma: 1.0 / display.gamma.clamp(0.5, 3.0),
+            // `PRESENT_*`
+            encoding: match (display.encoding, self.format) {
+                (Encoding::Srgb, Format::Rgba8Srgb) => 1,
+                (Encoding::Srgb, _) => 0,
+                (Encoding::ScRgb, _) => 2,
+                (Encoding::Hdr10, _) => 3,
+            },
+            wide: wide.into(),
+            white: display.white,
         });
         pass.draw(3, 1, 0, 0);
         Ok(())

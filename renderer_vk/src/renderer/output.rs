@@ -9,10 +9,11 @@ use crate::api::Picture;
 use crate::assets::ImageSource;
 use crate::error::Error;
 use crate::frame::{CLEAR, FrameContext, Item};
-use crate::gpu::{ColorMask, Format, Image, Recorder};
+use crate::gpu::{ColorMask, Encoding, Format, Image, ImageDesc, ImageUsage, Recorder};
 use crate::half::half;
-use crate::raster::{self, Present};
+use crate::raster::{self, Display, Present};
 use crate::scene::Statistics;
+use crate::settings::Settings;
 use crate::stereo::Eye;
 use crate::trace::TraceLook;
 
@@ -46,6 +47,23 @@ pub struct CpuTimes {
 
 pub(super) fn milliseconds(from: Instant, to: Instant) -> f32 {
     to.duration_since(from).as_secs_f32() * 1000.0
+}
+
+/// How the settings show display values in a window of this encoding.
+fn display(settings: &Settings, encoding: Encoding) -> Display {
+    Display {
+        gamma: settings.display_gamma(),
+        overbright_bits: settings.effective_overbright_bits(),
+        encoding,
+        white: settings.hdr_white,
+    }
+}
+
+/// Four half floats a texel as four bytes; values above 1 are 255.
+fn bytes_of_halves(texels: &[u8]) -> Vec<u8> {
+    let halves: Vec<u16> = bytemuck::pod_collect_to_vec(texels);
+    let byte = |v: u16| (half(v).clamp(0.0, 1.0) * 255.0).round() as u8;
+    halves.into_iter().map(byte).collect()
 }
 
 impl Renderer {
@@ -225,6 +243,8 @@ impl Renderer {
         match &mut self.swapchain {
             Some(swapchain) => {
                 if let Some(target) = swapchain.acquire(&mut recorder)? {
+                    // a window may have moved to another display
+                    self.encoding = swapchain.encoding();
                     // a change of the window's format needs a new swapchain
                     if self
                         .present
@@ -233,15 +253,9 @@ impl Renderer {
                     {
                         self.present = Some(Present::new(&self.device, target.format())?);
                     }
+                    let display = display(&self.settings, self.encoding);
                     if let Some(present) = &self.present {
-                        let bits = self.settings.effective_overbright_bits();
-                        present.record(
-                            &mut recorder,
-                            self.targets.color(),
-                            &target,
-                            self.settings.display_gamma(),
-                            bits,
-                        )?;
+                        present.record(&mut recorder, self.targets.color(), &target, display)?;
                     }
                 }
                 self.ring.end_present(recorder, swapchain)?;
@@ -260,6 +274,9 @@ impl Renderer {
             && self.settings.effective_overbright_bits() == 0
             && !self.settings.rt
             && !self.queue.iter().any(traced);
+        if self.encoding != Encoding::Srgb {
+            return raster::WIDE_FORMAT;
+        }
         match &self.swapchain {
             Some(swapchain)
                 if plain && swapchain.copies() && swapchain.format() == Format::Bgra8 =>
@@ -277,10 +294,36 @@ impl Renderer {
     pub fn read_pixels(&mut self) -> Result<Picture, Error> {
         self.flush(false)?;
         let (width, height) = self.size();
-        let texels = self.device.read_image(self.targets.color())?;
-        let blue_first = self.targets.color().format() == Format::Bgra8;
-        let rgb = self.displayed(&texels, blue_first);
+        let color = self.targets.color();
+        let mut texels = self.device.read_image(color)?;
+        if color.format() == raster::WIDE_FORMAT {
+            texels = bytes_of_halves(&texels);
+        }
+        let rgb = self.displayed(&texels, color.format() == Format::Bgra8);
         Ok(Picture { width, height, rgb })
+    }
+
+    /// The image that the window would show, for a window of more than white: linear light in units of 80 cd/m² (scRGB),
+    /// or the code values of HDR10, 0 to 1. RGB in rows from the top; empty with 8 bits a channel.
+    ///
+    /// # Errors
+    /// The device is lost or out of memory.
+    pub fn read_presented(&mut self) -> Result<Vec<[f32; 3]>, Error> {
+        if self.encoding == Encoding::Srgb {
+            return Ok(Vec::new());
+        }
+        self.flush(false)?;
+        let (width, height) = self.size();
+        // code values in half floats: read back alike for both encodings
+        let format = raster::WIDE_FORMAT;
+        let desc = ImageDesc::new("presented", width, height, format, ImageUsage::COLOR);
+        let image = Image::new(&self.device, &desc)?;
+        let present = Present::new(&self.device, format)?;
+        let display = display(&self.settings, self.encoding);
+        let frame = self.targets.color();
+        self.device
+            .immediate(|recorder| present.record(recorder, frame, &image, display))?;
+        self.radiance_of(&image)
     }
 
     /// Display values of texels of four bytes, without alpha.

@@ -28,6 +28,20 @@ numbered! {
 }
 
 numbered! {
+    /// Output for displays that show more than white.
+    HdrChoice {
+        /// None: 8 bits a channel.
+        Off = 0,
+        /// What the display offers, HDR10 first.
+        Any = 1,
+        /// Rec. 2020 primaries and SMPTE ST 2084, 10 bits a channel.
+        Hdr10 = 2,
+        /// Linear Rec. 709 in half floats; 1 is 80 cd/m².
+        ScRgb = 3,
+    }
+}
+
+numbered! {
     /// Output of the traced look.
     DebugOutput {
         /// The picture.

@@ -121,6 +121,10 @@ pub struct TargetView {
     pub height: u32,
     /// Channels that are written: 1 red, 2 green, 4 blue.
     pub channels: u32,
+    /// Brightest displayed value over white: 1 for an image of 8 bits a channel, more for one of half floats.
+    pub peak: f32,
+    /// To a multiple of eight bytes.
+    pub padding: u32,
 }
 
 /// Inputs of the passes after lighting, and ray counters.

@@ -11,7 +11,7 @@ use shaders::types::{SunDisc, constants::NO_TEXTURE};
 use super::super::indirect::is_subsampled;
 use super::{DARK_ADAPTATION, LIGHT_ADAPTATION, TracedView, ViewTracer, is_lit};
 use crate::gpu::{Error, Image, Recorder};
-use crate::raster::FlareTest;
+use crate::raster::{FlareTest, WIDE_FORMAT};
 use crate::scene::{SUN_SIZE, TracedScene, perpendicular};
 use crate::settings::Settings;
 use crate::trace::accel::AccelOutput;
@@ -115,6 +115,11 @@ impl ViewTracer {
             width: traced.target.width(),
             height: traced.target.height(),
             channels: self.channels,
+            peak: match traced.target.format() == WIDE_FORMAT {
+                true => (traced.settings.hdr_peak / traced.settings.hdr_white).max(1.01),
+                false => 1.0,
+            },
+            padding: 0,
         }
     }
 
