@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use egui_winit::State as EguiState;
 use gui::egui::ViewportId;
 use renderer_vk::{Renderer, RendererOptions, Window as Surface};
@@ -39,7 +39,12 @@ pub struct WindowOptions {
 pub fn run(start: Start, options: WindowOptions) -> Result<Vec<String>> {
     let event_loop = EventLoop::<()>::with_user_event()
         .build()
-        .context("no window: is there a display? relight render makes pictures without one")?;
+        // its text names a file of a library
+        .map_err(|_| {
+            anyhow!(
+                "no window: there is no display here; relight render makes pictures without one"
+            )
+        })?;
     let mut app = App {
         proxy: event_loop.create_proxy(),
         start: Some(start),

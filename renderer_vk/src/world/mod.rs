@@ -345,18 +345,21 @@ impl World {
             };
             // One line per quarter: a map may take minutes on a slow machine.
             let (name, mut reported) = (relit.name.clone(), 0);
+            let begin = std::time::Instant::now();
             let report = relight::calibrate_with(relit, &options, &mut |done| {
                 let quarter = (done * 4.0) as u32;
                 if quarter > reported && quarter < 4 {
                     reported = quarter;
-                    log::info!("{name}: calibrating lights, {} % done", quarter * 25);
+                    let left = begin.elapsed().as_secs_f32() * (1.0 - done) / done;
+                    log::info!(
+                        "{name}: finding its lights, only this first time: {} % done, about {left:.0} s left",
+                        quarter * 25
+                    );
                 }
             });
-            log::info!(
-                "{}: lights calibrated to the lightmaps in {:.1} s",
-                relit.name,
-                report.seconds
-            );
+            if !report.cached {
+                log::info!("{}: lights found in {:.1} s", relit.name, report.seconds);
+            }
         }
         self.before_hand = Some(relit.lighting());
         relit.light_by_hand(&*files);
@@ -364,7 +367,7 @@ impl World {
         for warning in relit.warnings.iter().skip(warned) {
             log::warn!("{}: {warning}", relit.name);
         }
-        log::info!(
+        log::debug!(
             "{}: visibility sweep of light lists {} {:.2} s, {} of {} entries left",
             relit.name,
             if swept.cached {
