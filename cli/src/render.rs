@@ -50,7 +50,7 @@ pub struct RenderArgs {
     /// The map: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp file, a pack (.pk3) with one map, or pack.pk3:maps/x.bsp
     #[arg(required_unless_present = "sample", value_name = "MAP")]
     map: Option<String>,
-    /// Render the built-in sample map
+    /// Use the built-in sample map
     #[arg(long, conflicts_with = "map")]
     sample: bool,
     #[command(flatten)]

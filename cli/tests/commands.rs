@@ -36,6 +36,7 @@ fn help_lists_the_commands_of_users_and_those_of_the_lab_apart() {
         "material",
         "render",
         "report",
+        "view",
         "help",
     ];
     assert_eq!(listed(RELIGHT), users);

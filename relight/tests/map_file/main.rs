@@ -85,10 +85,27 @@ struct Made<'a> {
     polygon: Vec<DVec3>,
 }
 
-fn agreement(text: &str, world: &RelitWorld) -> Agreement {
+/// Size of the image of a face's material.
+fn image_of(face: &read::Face, world: &RelitWorld, files: &dyn GameFiles) -> Option<DVec2> {
+    let named = |name: &str| {
+        let name = name.to_ascii_lowercase();
+        name.strip_prefix("textures/").unwrap_or(&name) == face.name.to_ascii_lowercase()
+    };
+    let material = world.materials.iter().find(|m| named(&m.name))?;
+    // as editors: the image of the material's name, otherwise that of its first stage
+    let stage = (material.resolved.script.as_ref()).and_then(|script| script.image_names().next());
+    let mut names = [Some(material.name.as_str()), stage].into_iter().flatten();
+    let (width, height) = names.find_map(|name| relight::image::texture_size(files, name))?;
+    Some(DVec2::new(width.into(), height.into()))
+}
+
+fn agreement(text: &str, world: &RelitWorld, files: &dyn GameFiles) -> Agreement {
     let bsp = &world.bsp;
     let mut out = Agreement::default();
-    let file = read::read(text);
+    let mut file = read::read(text);
+    for face in file.iter_mut().flat_map(|e| e.brushes.iter_mut().flatten()) {
+        face.image = image_of(face, world, files).unwrap_or(face.image);
+    }
     let entities = bsp.entities();
     assert_eq!(file.len(), entities.len());
     out.entities = file.len();
@@ -282,7 +299,7 @@ fn the_sample_map_comes_back() {
     let files: MemoryFiles = relight::sample::files().unwrap();
     for brushes in [Brushes::Usual, Brushes::Valve, Brushes::Classic] {
         let (text, world) = write(&files, relight::sample::MAP, brushes);
-        let found = agreement(&text, &world);
+        let found = agreement(&text, &world, &files);
         println!("{found:?}");
         assert!(found.open == 0 && found.brushes > 0 && found.patches > 0);
         assert!(found.on_faces > 0 && found.aligned == found.on_faces);
@@ -297,7 +314,7 @@ fn real_maps_come_back() {
     let files = SearchPath::open(&[folder]).unwrap();
     for name in ["oa_bases3cl", "q3dm6ish", "kaos"] {
         let (text, world) = write(&files, &format!("maps/{name}.bsp"), Brushes::Usual);
-        let found = agreement(&text, &world);
+        let found = agreement(&text, &world, &files);
         println!("{name}: {found:?}");
         assert_eq!(found.open, 0);
         assert_eq!((found.unclosed, found.other_bounds), (0, 0), "{name}");
@@ -326,8 +343,8 @@ fn a_file_saved_by_an_editor_is_the_map() {
     };
     let files = SearchPath::open(&[folder]).unwrap();
     let (text, world) = write(&files, &format!("maps/{map}.bsp"), Brushes::Usual);
-    let ours = agreement(&text, &world);
-    let found = agreement(&std::fs::read_to_string(file).unwrap(), &world);
+    let ours = agreement(&text, &world, &files);
+    let found = agreement(&std::fs::read_to_string(file).unwrap(), &world, &files);
     println!("{map}: {found:?}");
     // Editors write projections in texels, which are unknown without the images.
     let without = |a: Agreement| Agreement { aligned: 0, ..a };
@@ -348,7 +365,7 @@ fn all_maps_come_back() {
         files.add_pk3(pack).unwrap();
         for map in Pk3::open(pack).unwrap().list("maps", ".bsp") {
             let (text, world) = write(&files, &format!("maps/{map}"), Brushes::Usual);
-            let found = agreement(&text, &world);
+            let found = agreement(&text, &world, &files);
             println!("{map}: {found:?}");
             count += 1;
             all.add(&found);

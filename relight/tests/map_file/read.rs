@@ -32,6 +32,8 @@ pub struct Face {
     pub dist: f64,
     pub name: String,
     pub contents: u32,
+    /// Size of the image, texels.
+    pub image: DVec2,
     texture: Texture,
 }
 
@@ -45,7 +47,7 @@ enum Texture {
 }
 
 impl Face {
-    /// The texture's coordinates at a place; those of lines in texels with images of 64.
+    /// The texture's coordinates at a place.
     pub fn st(&self, p: DVec3) -> DVec2 {
         match &self.texture {
             Texture::Matrix([s, t]) => {
@@ -66,11 +68,11 @@ impl Face {
                 let turn = |w: DVec2| DVec2::from_angle(angle.to_radians()).rotate(w);
                 let s = turn(u).dot(v) / s_scale + s0;
                 let t = turn(DVec2::new(0.0, -1.0)).dot(v) / t_scale + t0;
-                DVec2::new(s, t) / 64.0
+                DVec2::new(s, t) / self.image
             }
             Texture::Valve([s, t]) => {
                 let at = |(axis, offset, scale): &(DVec3, f64, f64)| axis.dot(p) / scale + offset;
-                DVec2::new(at(s), at(t)) / 64.0
+                DVec2::new(at(s), at(t)) / self.image
             }
         }
     }
@@ -225,6 +227,7 @@ fn faces(words: &mut Words<'_>) -> Vec<Face> {
             dist: normal.dot(b),
             name,
             contents,
+            image: DVec2::splat(64.0),
             texture,
         });
     }
