@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use image::ImageEncoder;
 use relight::compare::Rgb8;
 
@@ -52,6 +52,13 @@ pub fn check_name(path: &Path) -> Result<()> {
 /// # Errors
 /// The file cannot be written, or `rgb` does not have three bytes a pixel.
 pub fn write_rgb(path: &Path, rgb: &[u8], width: u32, height: u32) -> Result<()> {
+    // the encoders of `image` panic otherwise
+    ensure!(
+        rgb.len() as u64 == u64::from(width) * u64::from(height) * 3,
+        "{}: {} bytes for {width} x {height} pixels",
+        path.display(),
+        rgb.len()
+    );
     let mut bytes = Vec::new();
     let kind = image::ExtendedColorType::Rgb8;
     if is_jpeg(path) {
