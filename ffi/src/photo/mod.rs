@@ -60,6 +60,17 @@ pub enum Action {
     Close,
 }
 
+/// Steps of a picture, or of a view of a panorama.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Step {
+    /// It is requested next.
+    Wanted,
+    /// The next frame has its camera, and the renderer keeps the view.
+    Posed,
+    /// The renderer averages frames of the kept view.
+    Averaged,
+}
+
 /// A picture in progress.
 #[derive(Debug)]
 struct Job {
@@ -67,8 +78,7 @@ struct Job {
     path: String,
     size: (u32, u32),
     samples: u32,
-    /// The current picture or view is requested.
-    requested: bool,
+    step: Step,
     /// Finished views of a panorama.
     faces: Vec<Picture>,
 }
@@ -172,12 +182,12 @@ impl Photo {
         }
     }
 
-    /// The camera: that of the next view of a panorama while it is requested, otherwise the free one.
+    /// The camera of the next frame: that of a view of a panorama that is to be kept, otherwise the free one.
     pub fn camera(&self) -> FreeCamera {
         let face = self
             .job
             .as_ref()
-            .filter(|job| job.kind == Kind::Panorama && !job.requested);
+            .filter(|job| job.kind == Kind::Panorama && job.step == Step::Posed);
         if let Some(axis) = face.and_then(|job| panorama::FACES.get(job.faces.len())) {
             return FreeCamera {
                 origin: self.motion.camera.origin,
@@ -221,7 +231,7 @@ impl Photo {
             path,
             size,
             samples: self.samples,
-            requested: false,
+            step: Step::Wanted,
             faces: Vec::new(),
         });
     }
@@ -260,11 +270,16 @@ impl Photo {
         renderer: &mut Renderer,
         yaw: f32,
     ) -> Result<Option<Finished>, String> {
-        if !job.requested {
-            let radiance = job.kind == Kind::Exr;
-            renderer.request_still(job.samples, Some(job.size), radiance)?;
-            job.requested = true;
-            return Ok(None);
+        match job.step {
+            Step::Wanted => {
+                let radiance = job.kind == Kind::Exr;
+                renderer.request_still(job.samples, Some(job.size), radiance)?;
+                job.step = Step::Posed;
+                return Ok(None);
+            }
+            // the frame that has just ended had the camera
+            Step::Posed => job.step = Step::Averaged,
+            Step::Averaged => {}
         }
         let still = renderer.take_still().map_err(|e| e.to_string())?;
         let Some(StillPicture { picture, radiance }) = still else {
@@ -282,7 +297,7 @@ impl Photo {
                 let width = (job.size.0 as f32 * std::f32::consts::PI) as u32;
                 job.faces.push(picture);
                 if job.faces.len() < panorama::FACES.len() {
-                    job.requested = false;
+                    job.step = Step::Wanted;
                     return Ok(None);
                 }
                 let joined = panorama::join(&job.faces, width & !1, yaw);

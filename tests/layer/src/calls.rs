@@ -164,6 +164,7 @@ pub const EXTENSIONS: &[&str] = &[
     "VK_EXT_extended_dynamic_state",
     "VK_EXT_extended_dynamic_state3",
     "VK_EXT_headless_surface",
+    "VK_EXT_swapchain_colorspace",
     "VK_EXT_validation_features",
     "VK_KHR_acceleration_structure",
     "VK_KHR_deferred_host_operations",
