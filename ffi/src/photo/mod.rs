@@ -414,3 +414,56 @@ fn area(context: &egui::Context) -> (Option<Pos2>, Vec2) {
     let by = response.drag_delta();
     (at.filter(|_| response.clicked()), Vec2::new(by.x, by.y))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_view_of_a_panorama_has_the_frame_in_which_it_is_kept() {
+        let size = (64, 32);
+        let mut photo = Photo::new(&RefDef::default(), size);
+        let free = photo.camera();
+        photo.take(Kind::Panorama, "a.png".to_owned(), size);
+        let job = |photo: &mut Photo, step| {
+            let job = photo.job.as_mut().expect("a picture in progress");
+            job.step = step;
+        };
+        for face in panorama::FACES {
+            assert_eq!(photo.camera(), free);
+            job(&mut photo, Step::Posed);
+            let posed = photo.camera();
+            assert_eq!((posed.axis, posed.fov_y), (face, 90.0));
+            assert_eq!(posed.origin, free.origin);
+            job(&mut photo, Step::Averaged);
+            assert_eq!(photo.camera(), free);
+            // the view is finished
+            let finished = Picture {
+                width: 1,
+                height: 1,
+                rgb: vec![0; 3],
+            };
+            if let Some(job) = &mut photo.job {
+                job.faces.push(finished);
+                job.step = Step::Wanted;
+            }
+        }
+    }
+
+    #[test]
+    fn settings_change_only_while_it_lasts_and_a_panorama_has_one_exposure() {
+        let size = (64, 32);
+        let mut photo = Photo::new(&RefDef::default(), size);
+        photo.lens.exposure = 1.5;
+        let mut settings = Settings {
+            rt_exposure: 0.5,
+            ..Settings::default()
+        };
+        photo.put(&mut settings);
+        assert!(settings.rt_pause && settings.rt_exposure == 2.0);
+        assert!(settings.rt_auto_exposure && settings.rt_bloom > 0.0);
+        photo.take(Kind::Panorama, "a.png".to_owned(), size);
+        photo.put(&mut settings);
+        assert!(!settings.rt_auto_exposure && settings.rt_bloom == 0.0 && settings.rt_accumulate);
+    }
+}
