@@ -86,7 +86,7 @@ struct Made<'a> {
 }
 
 /// Size of the image of a face's material.
-fn image_of(face: &read::Face, world: &RelitWorld, files: &dyn GameFiles) -> Option<DVec2> {
+fn image_of(face: &Face, world: &RelitWorld, files: &dyn GameFiles) -> Option<DVec2> {
     let named = |name: &str| {
         let name = name.to_ascii_lowercase();
         name.strip_prefix("textures/").unwrap_or(&name) == face.name.to_ascii_lowercase()

@@ -50,10 +50,14 @@ impl HeldViews {
     }
 }
 
+/// Distance from the game's camera within which the player's own body stays invisible, units.
+const HEAD: f32 = 40.0;
+
 /// Moves the camera of a view.
 fn look_from(view: &mut TracedScene, camera: &FreeCamera) {
     let [.., width, height] = view.view.viewport;
     let tan = (camera.fov_y.clamp(1.0, 170.0).to_radians() * 0.5).tan();
+    let is_in_head = camera.origin.distance(view.view.origin) < HEAD;
     view.view.origin = camera.origin;
     view.view.axis = camera.axis;
     view.view.tan_y = tan;
@@ -67,8 +71,10 @@ fn look_from(view: &mut TracedScene, camera: &FreeCamera) {
         instance.is_some_and(|i| i.flags & c::INSTANCE_FIRST_PERSON != 0)
     };
     view.meshes.retain(|mesh| !of_weapon(mesh.instance));
-    for instance in instances {
-        instance.flags &= !c::INSTANCE_THIRD_PERSON;
+    if !is_in_head {
+        for instance in instances {
+            instance.flags &= !c::INSTANCE_THIRD_PERSON;
+        }
     }
 }
 
