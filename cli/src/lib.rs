@@ -53,11 +53,12 @@ mod tests {
     use super::{command, lab};
 
     /// Options whose description differs between commands, such as a file in one and a folder in another.
-    const DESCRIBED_APART: [&str; 7] = [
+    const DESCRIBED_APART: [&str; 8] = [
         "cache",
         "calibrate",
         "frames",
         "json",
+        "look",
         "output",
         "reference",
         "view",

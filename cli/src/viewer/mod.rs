@@ -39,7 +39,13 @@ pub struct ViewArgs {
     #[command(flatten)]
     game: Game,
     /// What is shown at first
-    #[arg(long = "look", value_enum, default_value = "traced", id = "shown")]
+    #[arg(
+        long = "look",
+        value_enum,
+        value_name = "LOOK",
+        default_value = "traced",
+        id = "shown"
+    )]
     look: Shown,
     /// Size in pixels
     #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1280x720", value_parser = parse_size)]
