@@ -258,7 +258,7 @@ impl Editor {
     }
 }
 
-/// Where the lights of a map are saved: `--lights`, the file beside the map's own file, or that of the last game folder.
+/// Where the lights of a map are saved: `--lights-file`, the file beside the map's own file, or that of the last game folder.
 pub fn lights_path(
     chosen: Option<&PathBuf>,
     map: &str,

@@ -58,7 +58,7 @@ pub struct ViewArgs {
     #[arg(long, value_name = "N", conflicts_with = "view")]
     spawn: Option<usize>,
     /// File of lights that is read and saved in place of the one beside the map
-    #[arg(long, value_name = "FILE")]
+    #[arg(long = "lights-file", value_name = "FILE")]
     lights: Option<PathBuf>,
     /// Cache calibrations, swept light lists and pipelines in this folder; default: the user's cache folder
     #[arg(long, value_name = "DIR")]

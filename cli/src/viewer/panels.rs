@@ -380,12 +380,13 @@ impl Viewer {
 
     pub(super) fn save_lights(&mut self) {
         let (Some(editor), Some(path)) = (&mut self.editor, &self.lights_path) else {
-            self.message = Some("no place to save lights; name one with --lights FILE".to_owned());
+            self.message =
+                Some("no place to save lights; name one with --lights-file FILE".to_owned());
             return;
         };
         self.message = Some(match editor.save(path) {
             Ok(()) => format!("saved {}", path.display()),
-            Err(e) => format!("{e:#}; choose another file with --lights FILE"),
+            Err(e) => format!("{e:#}; choose another file with --lights-file FILE"),
         });
     }
 
