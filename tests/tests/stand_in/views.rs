@@ -376,7 +376,7 @@ fn lights_of_the_map_can_be_chosen_while_playing() {
         }
         shown.push(engine.picture(&view).unwrap());
         let printed = text_of(&engine.take_messages());
-        fitted += printed.matches("lights calibrated").count();
+        fitted += printed.matches("lights found in").count();
     }
     // each light is found once, and then put back
     assert_eq!(fitted, 1);
