@@ -4,7 +4,6 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 use support::random::Random;
-use support::slice;
 
 use crate::calibrate::triangle_lights::{lambert, visible_part};
 use crate::emitters::{LightRef, PointLight};
@@ -61,10 +60,6 @@ pub struct Probe {
 impl Probe {
     /// Builds the hierarchies.
     pub fn new(world: &RelitWorld) -> Self {
-        let mut surface_of = vec![u32::MAX; world.indices.len() / 3];
-        for (index, surface) in (0u32..).zip(&world.surfaces) {
-            slice::part_mut(&mut surface_of, surface.triangles()).fill(index);
-        }
         let drawn = world.surfaces.iter().filter(|s| s.num_indices > 0);
         let triangles = drawn.flat_map(|surface| {
             let model = world.models.get(surface.model as usize);
@@ -77,7 +72,7 @@ impl Probe {
         Self {
             solid: Occluders::of_world(world),
             drawn: Occluders::new(triangles),
-            surface_of,
+            surface_of: world.surfaces_of_triangles(),
         }
     }
 
@@ -183,15 +178,7 @@ fn of_point(light: &PointLight, position: Vec3, normal: Vec3) -> f32 {
     if distance <= f32::EPSILON {
         return 0.0;
     }
-    let cone = light.spot.map_or(1.0, |spot| {
-        let along = -offset.dot(spot.direction);
-        let aside = (distance * distance - along * along).max(0.0).sqrt();
-        match along > 0.0 {
-            // the compiler fades a cone out over its last 32 units
-            true => ((along * spot.tan_half_angle - aside) / 32.0).clamp(0.0, 1.0),
-            false => 0.0,
-        }
-    });
+    let cone = light.spot.map_or(1.0, |spot| spot.part(offset));
     let cosine = (normal.dot(offset) / distance).max(0.0);
     light.falloff.irradiance(distance, cosine) * cone
 }

@@ -15,7 +15,7 @@ use std::collections::HashMap;
 use std::f32::consts::TAU;
 use support::parallel;
 use support::random::Random;
-use support::slice::{self, part_mut};
+use support::slice;
 
 /// Strata along each side of the unit square; a sample sends the square of this number of rays.
 const SIDE: u32 = 6;
@@ -74,7 +74,7 @@ impl Transfer {
         more: &[Sample],
         unlisted: impl Fn(u32) -> bool + Sync,
     ) {
-        let of_triangle = surfaces_of_triangles(world);
+        let of_triangle = world.surfaces_of_triangles();
         let near = Near::new(lit);
         let first = self.rows.len();
         let found = parallel::map(more, |i, sample| {
@@ -184,15 +184,6 @@ fn trace_from(
         }
     }
     (row, sky, glow)
-}
-
-/// Surface index of each triangle.
-pub(super) fn surfaces_of_triangles(world: &RelitWorld) -> Vec<u32> {
-    let mut of_triangle = vec![u32::MAX; world.indices.len() / 3];
-    for (index, surface) in (0u32..).zip(&world.surfaces) {
-        part_mut(&mut of_triangle, surface.triangles()).fill(index);
-    }
-    of_triangle
 }
 
 /// Index of the material that a ray hit, and the material.

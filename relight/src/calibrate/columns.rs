@@ -79,16 +79,7 @@ pub(super) fn unshadowed(sample: &Sample, lamp: Lamp, spot: Option<&Spot>) -> f3
     if cosine <= 0.0 || squared < NEAREST {
         return 0.0;
     }
-    let cone = spot.map_or(1.0, |spot| {
-        let along = -offset.dot(spot.direction);
-        let reach = along * spot.tan_half_angle;
-        let aside = (squared - along * along).max(0.0).sqrt();
-        if along <= 0.0 {
-            0.0
-        } else {
-            ((reach - aside) / 32.0).clamp(0.0, 1.0)
-        }
-    });
+    let cone = spot.map_or(1.0, |spot| spot.part(offset));
     let distance = squared.sqrt();
     let mut given = lamp.falloff.irradiance(distance, cosine / distance);
     if sample.site == Site::LightGrid && lamp.falloff != Falloff::InverseSquare {

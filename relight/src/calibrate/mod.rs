@@ -290,7 +290,7 @@ fn find(
         world,
         occluders: &occluders,
         unknown_skies,
-        of_triangle: bounce::surfaces_of_triangles(world),
+        of_triangle: world.surfaces_of_triangles(),
         sampling,
         near_light_texels: HashSet::new(),
         near_light_measurements: HashMap::new(),

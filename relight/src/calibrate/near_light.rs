@@ -4,7 +4,6 @@
 //! lights have been placed, rays from each of them find the texels around it; texels that the fit makes too bright
 //! join the samples, and the following fits include them.
 
-use super::bounce::surfaces_of_triangles;
 use super::columns::{self, Column, Lamp, Source, point_rows, sun_rows};
 use super::cutoff::pieces_of;
 use super::fit::Fit;
@@ -243,7 +242,7 @@ pub fn spots(world: &RelitWorld) -> Spots {
         ..Default::default()
     };
     let context = SampleContext::new(world, &occluders, &sampling);
-    let of_triangle = surfaces_of_triangles(world);
+    let of_triangle = world.surfaces_of_triangles();
     let lights: Vec<(Lamp, Vec3)> = (world.point_lights.iter())
         .filter(|light| light.spot.is_none())
         .map(|light| {

@@ -1,7 +1,7 @@
 //! Views from spawn points. Samples are stratified by area; these views weight them by how much of the screen they
 //! fill.
 
-use super::bounce::{Near, surfaces_of_triangles};
+use super::bounce::Near;
 use super::samples::Sample;
 use crate::occluders::Occluders;
 use crate::viewpoints::{self, Viewpoint};
@@ -46,7 +46,7 @@ pub(super) fn visible_samples(
     samples: &[Sample],
 ) -> Vec<(u32, u32)> {
     let views = views(&world.bsp.entities());
-    let of_triangle = surfaces_of_triangles(world);
+    let of_triangle = world.surfaces_of_triangles();
     let near = Near::new(samples);
     let rays = RAYS / views.len().max(1);
     let found = parallel::map(&views, |i, view| {

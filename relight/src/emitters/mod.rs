@@ -209,6 +209,19 @@ pub struct Spot {
     pub tan_half_angle: f32,
 }
 
+impl Spot {
+    /// Part of the light in a direction. `offset`: from the lit place to the light.
+    pub fn part(&self, offset: Vec3) -> f32 {
+        let along = -offset.dot(self.direction);
+        let aside = (offset.length_squared() - along * along).max(0.0).sqrt();
+        match along > 0.0 {
+            // the compiler fades a cone out over the last 32 units of its radius
+            true => ((along * self.tan_half_angle - aside) / 32.0).clamp(0.0, 1.0),
+            false => 0.0,
+        }
+    }
+}
+
 /// Light from infinitely far, through surfaces of sky.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct SunLight {

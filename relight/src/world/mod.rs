@@ -24,7 +24,7 @@ use crate::exposure::{self, Exposure};
 use crate::overbright;
 use glam::Vec3;
 use q3bsp::{Bsp, Lightmap};
-use support::slice::{self, item, part, span};
+use support::slice::{self, item, part, part_mut, span};
 
 /// A map prepared for tracing and rasterization.
 ///
@@ -139,6 +139,15 @@ impl RelitWorld {
             &self.indices,
             span(surface.first_index, surface.num_indices),
         )
+    }
+
+    /// Surface of each triangle of [`indices`](Self::indices); `u32::MAX` for a triangle of none.
+    pub fn surfaces_of_triangles(&self) -> Vec<u32> {
+        let mut of_triangle = vec![u32::MAX; self.indices.len() / 3];
+        for (index, surface) in (0u32..).zip(&self.surfaces) {
+            part_mut(&mut of_triangle, surface.triangles()).fill(index);
+        }
+        of_triangle
     }
 
     /// Corners of a triangle of [`indices`](Self::indices), model space.

@@ -77,7 +77,7 @@ fn texels_that_are_too_bright_join_the_samples_and_reduce_the_light() {
         world: &world,
         occluders: &occluders,
         unknown_skies: &[],
-        of_triangle: bounce::surfaces_of_triangles(&world),
+        of_triangle: world.surfaces_of_triangles(),
         sampling,
         near_light_texels: HashSet::new(),
         measured: MeasuredSpace::new(&samples),

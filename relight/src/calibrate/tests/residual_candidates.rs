@@ -13,7 +13,7 @@ fn candidate_rows_are_reused_and_extended_by_new_samples() {
     let (all, _) = samples::take(&world, &occluders, &sampling(800));
     let first = all.len() - 100;
     let measured = MeasuredSpace::new(&all);
-    let of_triangle = bounce::surfaces_of_triangles(&world);
+    let of_triangle = world.surfaces_of_triangles();
     let look = |residual_candidates: &mut ResidualCandidates, samples: &[Sample]| {
         let scene = Scene {
             world: &world,
