@@ -46,6 +46,7 @@ mod timers;
 mod tlas;
 mod upload;
 mod window;
+mod window_format;
 
 pub use accel::{Blas, BlasBuild, BlasFlags, BlasGeometry};
 pub use access::Access;
@@ -68,9 +69,10 @@ pub use pipeline_cache::is_pipeline_cache;
 pub use ray_tracing::{HitGroup, RayTracingDesc, RayTracingPipeline};
 pub use recorder::Recorder;
 pub use select::{DeviceInfo, DeviceKind, RayTracingLimits};
-pub use swapchain::{Encoding, Swapchain, SwapchainDesc};
+pub use swapchain::{Swapchain, SwapchainDesc};
 pub use tlas::{Instance, Tlas};
 pub use window::{CreateSurface, Window};
+pub use window_format::Encoding;
 
 #[cfg(test)]
 mod tests;

@@ -8,6 +8,7 @@ use super::error::{Context, Error};
 use super::graveyard::Garbage;
 use super::image::{Format, Image, layout_change};
 use super::recorder::{Acquired, Recorder};
+use super::window_format::{Encoding, WindowFormat};
 
 /// Timeout of image acquisition, nanoseconds. Window systems withhold images of invisible windows; the game continues
 /// without presenting.
@@ -24,36 +25,6 @@ pub struct SwapchainDesc {
     pub vsync: bool,
     /// Encodings of more than white that are wanted, the best first.
     pub wide: &'static [Encoding],
-}
-
-/// Encoding of a window's images.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Encoding {
-    /// sRGB, 8 bits a channel.
-    Srgb,
-    /// Rec. 2020 primaries and SMPTE ST 2084, 10 bits a channel.
-    Hdr10,
-    /// Linear Rec. 709 in half floats; 1 is 80 cd/m².
-    ScRgb,
-}
-
-impl Encoding {
-    /// Format of such images, of a window or not.
-    pub fn format(self) -> Format {
-        match self {
-            Self::Srgb => Format::Rgba8,
-            Self::Hdr10 => Format::Rgb10A2,
-            Self::ScRgb => Format::Rgba16F,
-        }
-    }
-
-    fn color_space(self) -> vk::ColorSpaceKHR {
-        match self {
-            Self::Srgb => vk::ColorSpaceKHR::SRGB_NONLINEAR,
-            Self::Hdr10 => vk::ColorSpaceKHR::HDR10_ST2084_EXT,
-            Self::ScRgb => vk::ColorSpaceKHR::EXTENDED_SRGB_LINEAR_EXT,
-        }
-    }
 }
 
 impl SwapchainDesc {
@@ -107,8 +78,7 @@ pub struct Swapchain {
     device: Device,
     desc: SwapchainDesc,
     raw: vk::SwapchainKHR,
-    format: Format,
-    encoding: Encoding,
+    format: WindowFormat,
     images: Vec<(Image, vk::Semaphore)>,
     stale: bool,
     /// Images can be targets of copies.
@@ -142,8 +112,7 @@ impl Swapchain {
             device: device.clone(),
             desc,
             raw: vk::SwapchainKHR::null(),
-            format: Format::Bgra8,
-            encoding: Encoding::Srgb,
+            format: WindowFormat::default(),
             images: Vec::new(),
             stale: true,
             copies: false,
@@ -151,19 +120,19 @@ impl Swapchain {
             put_off: None,
             late: false,
         };
-        (swapchain.format, swapchain.encoding) = swapchain.choose_format()?;
+        swapchain.format = swapchain.choose_format()?;
         swapchain.recreate()?;
         Ok(swapchain)
     }
 
     /// Format of the images: with [`Encoding::Srgb`] 8 bits per channel without conversion, red or blue first.
     pub fn format(&self) -> Format {
-        self.format
+        self.format.texels
     }
 
     /// Encoding of the images.
     pub fn encoding(&self) -> Encoding {
-        self.encoding
+        self.format.encoding
     }
 
     /// Whether images can be targets of copies in addition to attachments.
@@ -340,51 +309,19 @@ impl Swapchain {
     }
 
     /// Selects a format of 8 bits per channel without conversion, because the picture is already display-encoded.
-    fn choose_format(&self) -> Result<(Format, Encoding), Error> {
+    fn choose_format(&self) -> Result<WindowFormat, Error> {
         let (functions, surface) = self.surface()?;
         // SAFETY: surface and physical device belong to the same live instance.
         let formats = unsafe {
             functions.get_physical_device_surface_formats(self.device.0.physical, surface)
         }
         .context("vkGetPhysicalDeviceSurfaceFormatsKHR")?;
-        Self::choose_of(&formats, self.desc.wide).ok_or_else(|| {
+        WindowFormat::choose(&formats, self.desc.wide).ok_or_else(|| {
             Error::Surface(format!(
                 "the window offers no 8-bit UNORM format, only {:?}",
                 formats.iter().map(|f| f.format).collect::<Vec<_>>()
             ))
         })
-    }
-
-    /// The first wanted encoding that is offered, otherwise 8 bits a channel.
-    fn choose_of(
-        offered: &[vk::SurfaceFormatKHR],
-        wide: &[Encoding],
-    ) -> Option<(Format, Encoding)> {
-        let has = |format: Format, space: vk::ColorSpaceKHR| {
-            let same = |f: &vk::SurfaceFormatKHR| f.format == format.vk() && f.color_space == space;
-            offered.iter().any(same)
-        };
-        let wide = wide.iter().find(|e| has(e.format(), e.color_space()));
-        if let Some(encoding) = wide {
-            return Some((encoding.format(), *encoding));
-        }
-        let plain = [Format::Bgra8, Format::Rgba8].into_iter();
-        let mut plain = plain.filter(|f| offered.iter().any(|o| o.format == f.vk()));
-        plain.next().map(|format| (format, Encoding::Srgb))
-    }
-
-    /// Colour space of the images: that of the encoding, or another one if the window has none but that.
-    fn color_space(&self) -> Result<vk::ColorSpaceKHR, Error> {
-        let (functions, surface) = self.surface()?;
-        // SAFETY: surface and physical device belong to the same live instance.
-        let formats = unsafe {
-            functions.get_physical_device_surface_formats(self.device.0.physical, surface)
-        }
-        .context("vkGetPhysicalDeviceSurfaceFormatsKHR")?;
-        let wanted = self.encoding.color_space();
-        let of_format = formats.iter().filter(|f| f.format == self.format.vk());
-        let nearest = of_format.min_by_key(|f| f.color_space != wanted);
-        Ok(nearest.map_or(wanted, |f| f.color_space))
     }
 
     /// Recreates the swapchain for the present window; without images while it is minimised. Waits for the device,
@@ -402,9 +339,7 @@ impl Swapchain {
             ));
         };
         self.forget_images();
-        let (format, encoding) = self.choose_format()?;
-        (self.format, self.encoding) = (format, encoding);
-        let color_space = self.color_space()?;
+        self.format = self.choose_format()?;
         let (functions, surface) = self.surface()?;
         // SAFETY: surface and physical device belong to the same live instance.
         let caps = unsafe {
@@ -432,8 +367,8 @@ impl Swapchain {
         let info = vk::SwapchainCreateInfoKHR::default()
             .surface(surface)
             .min_image_count(count)
-            .image_format(format.vk())
-            .image_color_space(color_space)
+            .image_format(self.format.texels.vk())
+            .image_color_space(self.format.color_space)
             .image_extent(extent)
             .image_array_layers(1)
             .image_usage(usage)
@@ -469,8 +404,14 @@ impl Swapchain {
             .context("vkGetSwapchainImagesKHR")?;
         for raw in raw_images {
             let (width, height) = (extent.width, extent.height);
-            let image =
-                Image::of_swapchain(device, raw, "swapchain image", width, height, self.format)?;
+            let image = Image::of_swapchain(
+                device,
+                raw,
+                "swapchain image",
+                width,
+                height,
+                self.format.texels,
+            )?;
             // SAFETY: plain creation.
             let finished = unsafe {
                 device
@@ -568,33 +509,6 @@ mod tests {
         // The device needs the loader until it is dropped.
         std::mem::forget(entry);
         device
-    }
-
-    #[test]
-    fn the_first_wanted_encoding_that_is_offered_is_chosen() {
-        let offer = |format: Format, color_space| vk::SurfaceFormatKHR {
-            format: format.vk(),
-            color_space,
-        };
-        let plain = offer(Format::Bgra8, vk::ColorSpaceKHR::SRGB_NONLINEAR);
-        let hdr10 = offer(Format::Rgb10A2, vk::ColorSpaceKHR::HDR10_ST2084_EXT);
-        let sc_rgb = offer(Format::Rgba16F, vk::ColorSpaceKHR::EXTENDED_SRGB_LINEAR_EXT);
-        // the format alone is not enough
-        let deep = offer(Format::Rgb10A2, vk::ColorSpaceKHR::SRGB_NONLINEAR);
-        let choose = |offered: &[_], wide: &[Encoding]| Swapchain::choose_of(offered, wide);
-        let both = [Encoding::Hdr10, Encoding::ScRgb];
-        let srgb = Some((Format::Bgra8, Encoding::Srgb));
-        assert_eq!(choose(&[plain, hdr10, sc_rgb], &[]), srgb);
-        assert_eq!(choose(&[plain, deep], &both), srgb);
-        assert_eq!(
-            choose(&[plain, sc_rgb, hdr10], &both),
-            Some((Format::Rgb10A2, Encoding::Hdr10))
-        );
-        assert_eq!(
-            choose(&[plain, sc_rgb], &both),
-            Some((Format::Rgba16F, Encoding::ScRgb))
-        );
-        assert_eq!(choose(&[deep], &both), None);
     }
 
     #[test]
