@@ -7,15 +7,18 @@ use relight::{FileError, SearchPath};
 
 // No documentation comments on these structures: clap would show them in place of the subcommand's description.
 
+/// The game that is read where none is named.
+pub const USUAL: &str = "/usr/share/games/openarena/baseoa";
+
 // The game whose files a command reads.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 pub struct Game {
     /// Game folder with packs, or one pack (.pk3); repeat it in ascending priority (the base game first, the mod after
     /// it)
     #[arg(
         long = "game",
         value_name = "DIR",
-        default_value = "/usr/share/games/openarena/baseoa"
+        default_value = USUAL
     )]
     pub paths: Vec<PathBuf>,
 }

@@ -9,6 +9,7 @@ mod beside;
 mod brought;
 mod calibration;
 mod cameras;
+mod chosen;
 mod command;
 mod compare;
 mod convert;

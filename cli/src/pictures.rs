@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail, ensure};
-use image::ImageEncoder;
+use anyhow::{Context, Result, bail};
 use relight::compare::Rgb8;
+use renderer_vk::picture_files;
 
 /// Writes a file atomically: to a temporary file beside it, which is then renamed.
 ///
@@ -52,21 +52,11 @@ pub fn check_name(path: &Path) -> Result<()> {
 /// # Errors
 /// The file cannot be written, or `rgb` does not have three bytes a pixel.
 pub fn write_rgb(path: &Path, rgb: &[u8], width: u32, height: u32) -> Result<()> {
-    // the encoders of `image` panic otherwise
-    ensure!(
-        rgb.len() as u64 == u64::from(width) * u64::from(height) * 3,
-        "{}: {} bytes for {width} x {height} pixels",
-        path.display(),
-        rgb.len()
-    );
-    let mut bytes = Vec::new();
-    let kind = image::ExtendedColorType::Rgb8;
-    if is_jpeg(path) {
-        image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY)
-            .write_image(rgb, width, height, kind)?;
-    } else {
-        image::codecs::png::PngEncoder::new(&mut bytes).write_image(rgb, width, height, kind)?;
-    }
+    let encoded = match is_jpeg(path) {
+        true => picture_files::jpeg(rgb, width, height, JPEG_QUALITY),
+        false => picture_files::png(rgb, width, height),
+    };
+    let bytes = encoded.with_context(|| path.display().to_string())?;
     write_whole(path, &bytes)
 }
 

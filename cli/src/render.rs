@@ -1,19 +1,17 @@
 //! `relight render`: pictures of a map, without engine and display.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-use crate::game::Game;
+use crate::chosen::{ChosenCamera, ChosenMap};
 use crate::numbers;
 use crate::pictures::{check_name, write_rgb};
 use crate::settings::{Assignment, SettingArgs, default, help, value_of};
 use crate::timings::Timings;
-use crate::view::{Camera, draw, load, open};
+use crate::view::{Camera, draw, load};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use glam::Vec3;
 use indicatif::{ProgressBar, ProgressStyle};
-use relight::GameFiles;
 use renderer_vk::api::RefDef;
 use renderer_vk::path::{self, PathPoint};
 use renderer_vk::{LightSelection, Renderer, RendererOptions, Settings};
@@ -47,14 +45,8 @@ pub enum Sampling {
 /// relight render oa_dm1 --path flight.txt --frames 120 --spp 16 -o flight.png (flight_0000.png, flight_0001.png, …)
 #[derive(Args, Debug)]
 pub struct RenderArgs {
-    /// The map: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp file, a pack (.pk3) with one map, or pack.pk3:maps/x.bsp
-    #[arg(required_unless_present = "sample", value_name = "MAP")]
-    map: Option<String>,
-    /// Use the built-in sample map
-    #[arg(long, conflicts_with = "map")]
-    sample: bool,
     #[command(flatten)]
-    game: Game,
+    chosen: ChosenMap,
     /// Output file (PNG, or JPEG by the ending .jpg)
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
@@ -64,13 +56,8 @@ pub struct RenderArgs {
     /// Size in pixels
     #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1280x720", value_parser = parse_size)]
     size: (u32, u32),
-    /// Camera: position in units, yaw and pitch (down) in degrees, which may be left out; default: the map's
-    /// intermission or first spawn point
-    #[arg(long, value_parser = parse_view, allow_hyphen_values = true, value_name = "X,Y,Z,YAW,PITCH")]
-    view: Option<Camera>,
-    /// View from a spawn point, counted from 0 in the map's order
-    #[arg(long, value_name = "N", conflicts_with = "view")]
-    spawn: Option<usize>,
+    #[command(flatten)]
+    place: ChosenCamera,
     /// View of the whole map from above one of its corners; classic by default. The traced look moves the camera
     /// forward to the first position inside the map, below the sky
     #[arg(long, conflicts_with_all = ["view", "spawn"])]
@@ -163,18 +150,6 @@ fn read_path(file: &Path) -> anyhow::Result<Vec<PathPoint>> {
     Ok(points)
 }
 
-/// Parses `X,Y,Z[,YAW[,PITCH]]`; spaces may replace commas.
-pub fn parse_view(text: &str) -> Result<Camera, String> {
-    match numbers::list(text).as_deref() {
-        Some([x, y, z, rest @ ..]) if rest.len() <= 2 => Ok(Camera {
-            origin: Vec3::new(*x, *y, *z),
-            yaw: rest.first().copied().unwrap_or(0.0),
-            pitch: rest.get(1).copied().unwrap_or(0.0),
-        }),
-        _ => Err("a view is X,Y,Z,YAW,PITCH, for example 100,-50,80,90,10".into()),
-    }
-}
-
 /// Parses `X,Y,Z,YAW`.
 fn parse_step(text: &str) -> Result<[f32; 4], String> {
     let step = numbers::list(text).and_then(|step| step.try_into().ok());
@@ -237,9 +212,6 @@ impl RenderArgs {
 
     fn camera(&self, world: &relight::RelitWorld) -> anyhow::Result<Camera> {
         let bsp = &world.bsp;
-        if let Some(view) = self.view {
-            return Ok(view);
-        }
         if self.overview {
             let camera = Camera::overview(world, self.size, self.fov)
                 .context("the map has no triangles to draw")?;
@@ -249,17 +221,9 @@ impl RenderArgs {
                 Look::Traced => camera.moved_inside(bsp),
             });
         }
-        if let Some(number) = self.spawn {
-            let spawns = Camera::spawns(bsp);
-            return spawns
-                .get(number)
-                .copied()
-                .with_context(|| match spawns.len() {
-                    0 => format!("no spawn point {number}: the map has none"),
-                    count => format!("no spawn point {number}: the map has 0 to {}", count - 1),
-                });
-        }
-        Camera::of_map(bsp).context("the map has no place for a camera; set one with --view")
+        let chosen = self.place.find(bsp)?;
+        let camera = chosen.or_else(|| Camera::of_map(bsp));
+        camera.context("the map has no place for a camera; set one with --view")
     }
 
     /// Number of frames of a picture.
@@ -349,15 +313,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
             "--frames is the number of pictures of a --path; --spp is the number of frames drawn for one picture"
         );
     }
-    let (files, map) = if args.sample {
-        (
-            Arc::new(relight::sample::files()?) as Arc<dyn GameFiles>,
-            relight::sample::MAP.to_owned(),
-        )
-    } else {
-        // `clap` demands a map without `--sample`.
-        open(args.map.as_deref().unwrap_or_default(), &args.game)?
-    };
+    let (files, map) = args.chosen.open()?;
     let (width, height) = args.size;
     let mut renderer = Renderer::new(RendererOptions {
         validation: args.validate,
@@ -421,20 +377,4 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         );
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn views_are_read_as_people_write_them() {
-        let view = parse_view("1,-2.5, 3,90,-10").unwrap();
-        assert_eq!(view.origin, Vec3::new(1.0, -2.5, 3.0));
-        assert_eq!((view.yaw, view.pitch), (90.0, -10.0));
-        assert_eq!(parse_view("1 2 3").unwrap().yaw, 0.0);
-        for wrong in ["", "1,2", "1,2,3,4,5,6", "a,b,c", "1,2,nan"] {
-            assert!(parse_view(wrong).is_err(), "{wrong}");
-        }
-    }
 }

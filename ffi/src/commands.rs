@@ -1,6 +1,7 @@
 //! Console commands.
 
 pub mod benchmark;
+mod panels;
 
 use crate::boundary::entry;
 use crate::capture::{Format, Shot, StillShot, free_path, still_arguments};
@@ -9,16 +10,13 @@ use crate::cvars::Cvar;
 use crate::delivery::{set_variables, take_captures_of_last_frame};
 use crate::engine::{self, Engine, valid_path_to_write};
 use crate::failure::Failure;
-use crate::menu::Menu;
-use crate::menu::pointer::keys_of_word;
-use crate::photo::{Kind, Photo};
 use crate::presets::{self, Trial};
 use crate::session::{self, Front, with_renderer};
 use crate::window;
 use crate::window::modes::MODES;
 use renderer_vk::Renderer;
 use renderer_vk::settings::Preset;
-use std::ffi::{CStr, CString};
+use std::ffi::CStr;
 use std::time::Instant;
 
 /// A command, as the engine calls it.
@@ -51,8 +49,8 @@ static COMMANDS: &[(&CStr, Function)] = &[
     (c"rt_screenshot", still),
     (c"rt_path", path),
     (c"rt_preset", preset),
-    (c"rt_menu", menu),
-    (c"rt_photo", photo),
+    (c"rt_menu", panels::menu),
+    (c"rt_photo", panels::photo),
     (c"rt_benchmark", benchmark::run),
     (c"report", report),
 ];
@@ -225,83 +223,6 @@ unsafe extern "C" fn preset() {
     });
 }
 
-/// Opens the menu, or closes it. With a word: a key for the open menu.
-unsafe extern "C" fn menu() {
-    entry(|| {
-        let Some(engine) = engine::current() else {
-            return Ok(());
-        };
-        let arguments = engine.arguments();
-        let word = arguments.get(1).map(String::as_str);
-        let keys = word.map(keys_of_word);
-        let line = with_renderer(|renderer, front| {
-            let open = front.menu.is_some();
-            Ok(match keys {
-                Some(None) => Some("usage: rt_menu [up|down|left|right|enter|close]".to_owned()),
-                Some(Some(keys)) if open => {
-                    front.menu_keys.extend(keys);
-                    None
-                }
-                // a key for a closed menu, such as by a bind
-                Some(Some(_)) => None,
-                None if open => {
-                    front.menu = None;
-                    window::input::end();
-                    None
-                }
-                None => {
-                    front.menu = Some(Menu::new(renderer.size()));
-                    window::input::begin();
-                    None
-                }
-            })
-        })?;
-        if let Some(line) = line {
-            engine.say(&format!("{line}\n"));
-        }
-        Ok(())
-    });
-}
-
-/// Begins photo mode, or ends it; with a word: takes a picture in it.
-unsafe extern "C" fn photo() {
-    print_lines(|renderer, front, arguments| {
-        let chosen = match arguments.get(1..).unwrap_or_default() {
-            [] => None,
-            [kind] => Some((Kind::of(kind), Ok(None))),
-            [kind, samples] => Some((Kind::of(kind), samples.parse().map(Some))),
-            _ => Some((None, Ok(None))),
-        };
-        match (chosen, &mut front.photo) {
-            (Some((Some(kind), Ok(samples))), Some(photo)) => {
-                photo.ask(kind, samples);
-                Vec::new()
-            }
-            (Some((Some(_), Ok(_))), None) => {
-                vec!["give rt_photo first: it holds the scene".into()]
-            }
-            (Some(_), _) => vec!["usage: rt_photo, then rt_photo png|exr|360 [SAMPLES]".into()],
-            (None, Some(_)) => {
-                renderer.cancel_still();
-                front.photo = None;
-                window::input::end();
-                Vec::new()
-            }
-            (None, None) => match front.world_view {
-                Some(view) if front.settings.rt && renderer.world().is_some() => {
-                    front.menu = None;
-                    front.photo = Some(Photo::new(&view, renderer.size()));
-                    window::input::begin();
-                    Vec::new()
-                }
-                _ => {
-                    vec!["rt_photo needs the traced look: set r_rt 1 and start a map first".into()]
-                }
-            },
-        }
-    });
-}
-
 /// Begins `rt_preset auto`; the preset to begin with, and lines for the console.
 fn begin_trial(renderer: &Renderer, front: &mut Front) -> (Option<&'static Preset>, Vec<String>) {
     if !front.settings.rt || renderer.world().is_none() {
@@ -331,8 +252,7 @@ unsafe extern "C" fn report() {
         let Some(engine) = engine::current() else {
             return Ok(());
         };
-        let exists =
-            |path: &str| CString::new(path).is_ok_and(|path| engine.home_file_exists(&path));
+        let exists = |path: &str| engine.home_has(path);
         let Some(path) = free_path("reports/relight", "zip", &mut 0, exists) else {
             engine.say("report: all 10000 file names are taken\n");
             return Ok(());
@@ -492,8 +412,11 @@ fn begin_still(
     samples: u32,
     size: Option<(u32, u32)>,
 ) -> Result<Option<String>, Failure> {
-    let exists = |path: &str| CString::new(path).is_ok_and(|path| engine.home_file_exists(&path));
+    let exists = |path: &str| engine.home_has(path);
     with_renderer(|renderer, front| {
+        if front.benchmark.is_some() {
+            return Ok(Some(format!("rt_screenshot: {}", benchmark::IN_PROGRESS)));
+        }
         if let Err(reason) = renderer.request_still(samples, size, false) {
             return Ok(Some(format!("rt_screenshot: {reason}")));
         }
@@ -531,8 +454,7 @@ fn screenshot(format: Format) -> Result<(), Failure> {
     let path = if arguments.len() == 2 && !argument.is_empty() && !silent {
         Some(format!("screenshots/{argument}.{}", format.extension()))
     } else {
-        let exists =
-            |path: &str| CString::new(path).is_ok_and(|path| engine.home_file_exists(&path));
+        let exists = |path: &str| engine.home_has(path);
         session::with(|session| session.front.captures.next_path(format, exists)).flatten()
     };
     let Some(path) = path else {

@@ -10,9 +10,9 @@ use crate::engine::{self, Engine, valid_game_path};
 use crate::failure::Failure;
 use crate::files::EngineFiles;
 use crate::glconfig;
-use crate::panels::draw_panels;
 use crate::presets::Step;
 use crate::session::{self, Front, with_renderer};
+use crate::show_panel;
 use crate::window::{self, Window};
 use renderer_vk::{Eye, Renderer, RendererOptions};
 use std::ffi::{CStr, c_int};
@@ -263,8 +263,6 @@ pub fn end(ending: Ending) {
     }
     let destroyed = session::with(|session| {
         session.front.registered = false;
-        session.front.menu = None;
-        session.front.photo = None;
         session.front.world_view = None;
         session.front.trial = None;
         // after a failure nothing can be measured
@@ -275,8 +273,10 @@ pub fn end(ending: Ending) {
         session.front.captures.clear();
         session.front.cinematics.clear();
         if let Some(renderer) = &mut session.renderer {
+            show_panel::close(renderer, &mut session.front);
             renderer.shutdown_registration();
         }
+        session.front.panel = None;
         session.front.kept = matches!(ending, Ending::KeepAll | Ending::KeepWindow);
         if ending == Ending::KeepAll {
             None
@@ -338,8 +338,8 @@ pub unsafe extern "C" fn begin_frame(stereo: c_int) {
                 cvars::write_back_limits(cvars);
                 cvars::apply(cvars, &mut front.settings);
             }
-            if let Some(photo) = &front.photo {
-                photo.put(&mut front.settings);
+            if let Some(panel) = &front.panel {
+                panel.put(&mut front.settings);
             }
             front.frame_start = Some(Instant::now());
             renderer.set_settings(&front.settings);
@@ -398,7 +398,7 @@ fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Fa
         .frame_start
         .take()
         .map_or(0, |begin| milliseconds(start - begin));
-    draw_panels(renderer, front, &mut outbox)?;
+    show_panel::draw(renderer, front, &mut outbox)?;
     take_captures(renderer, front, &mut outbox)?;
     let skipped = std::mem::take(&mut front.skip_present);
     renderer.set_hidden(skipped || window::current().is_some_and(|window| window.is_hidden()));

@@ -11,8 +11,7 @@ use crate::cinematics::Cinematics;
 use crate::costs::Questions;
 use crate::cvars::Cvars;
 use crate::failure::Failure;
-use crate::menu::Menu;
-use crate::photo::Photo;
+use crate::panel::Panel;
 use crate::presets::Trial;
 use crate::window;
 use crate::window::input::Input;
@@ -46,14 +45,12 @@ pub struct Front {
     pub captures: Captures,
     /// Requests of `rt_stats` and `rt_printPerfStats`.
     pub questions: Questions,
-    /// `rt_menu`, while it is open.
-    pub menu: Option<Menu>,
-    /// `rt_photo`, while it is open.
-    pub photo: Option<Photo>,
+    /// `rt_menu` or `rt_photo`, while it is open.
+    pub panel: Option<Panel>,
     /// The game's view of the world in the newest frame.
     pub world_view: Option<RefDef>,
-    /// Keys for the menu by its command.
-    pub menu_keys: Vec<Input>,
+    /// Keys for the panel by a command.
+    pub panel_keys: Vec<Input>,
     /// `rt_preset auto`, while it measures.
     pub trial: Option<Trial>,
     /// `rt_benchmark`, while it measures.

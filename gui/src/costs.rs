@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use egui::Ui;
 use egui_plot::{Legend, Line, Plot, PlotPoints};
+use renderer_vk::Costs;
 
 /// Frames that are kept.
 const FRAMES: usize = 240;
@@ -28,17 +29,12 @@ impl CostHistory {
         if timings.is_empty() {
             return;
         }
-        let mut summed: Vec<(String, f32)> = Vec::new();
-        for (name, ms) in timings {
-            match summed.iter_mut().find(|(known, _)| known == name) {
-                Some((_, sum)) => *sum += ms,
-                None => summed.push((name.clone(), *ms)),
-            }
-        }
         if self.frames.len() == FRAMES {
             self.frames.pop_front();
         }
-        self.frames.push_back(summed);
+        let passes = Costs::passes(timings, |_| None);
+        let times = passes.into_iter().map(|pass| (pass.name, pass.ms));
+        self.frames.push_back(times.collect());
     }
 
     /// The newest frame.

@@ -9,6 +9,7 @@
 
 mod costs;
 mod motion;
+mod screen;
 mod settings;
 
 use std::collections::HashMap;
@@ -19,7 +20,8 @@ use renderer_vk::api::{UiFrame, UiMesh, UiTexture, UiVertex};
 
 pub use costs::{CostHistory, frame_time};
 pub use egui;
-pub use motion::{Motion, WALK_SPEED};
+pub use motion::Motion;
+pub use screen::Screen;
 pub use settings::{Change, MAIN, all_settings, main_settings, presets};
 
 /// A user interface: egui's state and its textures.

@@ -1,6 +1,6 @@
 //! Widgets for settings, made from the table of settings.
 
-use egui::{ComboBox, DragValue, RichText, Slider, Ui};
+use egui::{ComboBox, DragValue, Slider, Ui};
 use renderer_vk::Settings;
 use renderer_vk::settings::{Kind, PRESETS, Preset, ROWS, Range, Row, row};
 
@@ -215,9 +215,6 @@ fn widget(ui: &mut Ui, row: &Row, settings: &Settings, changes: &mut Vec<Change>
                 set(number.to_string());
             }
         }
-    }
-    if settings.rt_debug != Default::default() && row.spec.name == "rt_debug" {
-        ui.label(RichText::new("shown in place of the picture").weak());
     }
 }
 

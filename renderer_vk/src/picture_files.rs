@@ -1,23 +1,32 @@
-//! Pictures as files: PNG for the display, OpenEXR for linear light.
+//! Pictures as files: PNG and JPEG for the display, OpenEXR for linear light.
 
+use image::codecs::jpeg::JpegEncoder;
+use image::codecs::openexr::OpenExrEncoder;
+use image::codecs::png::PngEncoder;
 use image::error::{ParameterError, ParameterErrorKind};
 use image::{ExtendedColorType, ImageEncoder, ImageError, ImageResult};
 
-use crate::api::Picture;
-
-/// A PNG.
+/// A PNG of RGB bytes, rows from the top.
 ///
 /// # Errors
 /// The bytes do not match the size.
-pub fn png(picture: &Picture) -> ImageResult<Vec<u8>> {
-    fits(picture.rgb.len(), 3, picture.width, picture.height)?;
+pub fn png(rgb: &[u8], width: u32, height: u32) -> ImageResult<Vec<u8>> {
+    fits(rgb.len(), 3, width, height)?;
     let mut bytes = Vec::new();
-    image::codecs::png::PngEncoder::new(&mut bytes).write_image(
-        &picture.rgb,
-        picture.width,
-        picture.height,
-        ExtendedColorType::Rgb8,
-    )?;
+    let kind = ExtendedColorType::Rgb8;
+    PngEncoder::new(&mut bytes).write_image(rgb, width, height, kind)?;
+    Ok(bytes)
+}
+
+/// A JPEG of RGB bytes, rows from the top; quality in percent.
+///
+/// # Errors
+/// The bytes do not match the size.
+pub fn jpeg(rgb: &[u8], width: u32, height: u32, quality: u8) -> ImageResult<Vec<u8>> {
+    fits(rgb.len(), 3, width, height)?;
+    let mut bytes = Vec::new();
+    let kind = ExtendedColorType::Rgb8;
+    JpegEncoder::new_with_quality(&mut bytes, quality).write_image(rgb, width, height, kind)?;
     Ok(bytes)
 }
 
@@ -39,7 +48,7 @@ pub fn open_exr(radiance: &[[f32; 3]], width: u32, height: u32) -> ImageResult<V
     fits(radiance.len(), 1, width, height)?;
     let mut bytes = std::io::Cursor::new(Vec::new());
     let values: &[u8] = bytemuck::cast_slice(radiance);
-    image::codecs::openexr::OpenExrEncoder::new(&mut bytes).write_image(
+    OpenExrEncoder::new(&mut bytes).write_image(
         values,
         width,
         height,
@@ -54,24 +63,21 @@ mod tests {
 
     #[test]
     fn files_hold_what_was_written() {
-        let picture = Picture {
-            width: 2,
-            height: 1,
-            rgb: vec![1, 2, 3, 250, 251, 252],
-        };
-        let read = image::load_from_memory(&png(&picture).unwrap()).unwrap();
-        assert_eq!(read.to_rgb8().into_raw(), picture.rgb);
+        let rgb = [1, 2, 3, 250, 251, 252];
+        let read = image::load_from_memory(&png(&rgb, 2, 1).unwrap()).unwrap();
+        assert_eq!(read.to_rgb8().into_raw(), rgb);
+        let read = image::load_from_memory(&jpeg(&[128; 192], 8, 8, 90).unwrap()).unwrap();
+        assert!(
+            read.to_rgb8()
+                .into_raw()
+                .iter()
+                .all(|v| v.abs_diff(128) <= 1)
+        );
         let light = [[0.5, 1.0, 100.0], [0.0, 1e-4, 2.0]];
         let read = image::load_from_memory(&open_exr(&light, 2, 1).unwrap()).unwrap();
         let read = read.to_rgb32f().into_raw();
         assert_eq!(read, light.concat());
         assert!(open_exr(&light, 3, 1).is_err());
-        assert!(
-            png(&Picture {
-                width: 3,
-                ..picture
-            })
-            .is_err()
-        );
+        assert!(png(&rgb, 3, 1).is_err() && jpeg(&rgb, 1, 1, 90).is_err());
     }
 }

@@ -66,7 +66,7 @@ impl Report<'_> {
         text("log.txt", &lines(self.log))?;
         for (name, picture) in self.pictures {
             zip.start_file(format!("{name}.png"), SimpleFileOptions::default())?;
-            zip.write_all(&png(picture)?)?;
+            zip.write_all(&png(&picture.rgb, picture.width, picture.height)?)?;
         }
         Ok(zip.finish()?.into_inner())
     }

@@ -7,8 +7,9 @@ use renderer_vk::api::RefEntity;
 use renderer_vk::{LightSelection, Renderer, RendererOptions, Settings};
 use serde_json::{Value, json};
 
+use crate::chosen::parse_view;
 use crate::game::Maps;
-use crate::render::{parse_size, parse_view};
+use crate::render::parse_size;
 use crate::settings::{Assignment, SettingArgs, default, help, value_of};
 use crate::view::{Camera, draw, load, open};
 

@@ -29,9 +29,10 @@ use self::region::Regions;
 use self::stage::{Stage, Variant, variants};
 use super::statistics::{luminance, relative_bias, relative_error};
 use crate::cameras::{Place, places};
+use crate::chosen::parse_view;
 use crate::game::Maps;
 use crate::numbers;
-use crate::render::{parse_size, parse_view};
+use crate::render::parse_size;
 use crate::settings::{Assignment, SettingArgs, default, help, value_of};
 use crate::view::{Camera, load, map_name, open};
 

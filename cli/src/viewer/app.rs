@@ -88,7 +88,7 @@ impl Open {
         let attributes = Window::default_attributes()
             .with_title(format!(
                 "{} – Relight",
-                start.source.map.as_deref().unwrap_or("sample")
+                start.source.chosen.map.as_deref().unwrap_or("sample")
             ))
             .with_inner_size(PhysicalSize::new(width, height));
         let window = events
@@ -101,6 +101,7 @@ impl Open {
             validation: options.validation,
             device: options.device.clone(),
             vsync: true,
+            hdr: start.settings.hdr,
             pipeline_cache: Some(start.cache.join("pipelines.cache")),
             ..RendererOptions::headless(size.width.max(1), size.height.max(1))
         })

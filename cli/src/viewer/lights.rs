@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
-use glam::{Mat4, Vec2, Vec3, Vec4};
+use glam::Vec3;
 use relight::light::{
     ChangeableLights, DEFAULT_POINT_LIGHT_RADIUS, Falloff, LightsByHand, POINT_LIGHT_INTENSITY,
     PointLight, SUN_IRRADIANCE, SURFACE_LIGHT_RADIANCE, SunLight,
@@ -258,17 +258,18 @@ impl Editor {
     }
 }
 
-/// Where the lights of a map are saved: `--lights-file`, the file beside the map's own file, or that of the last game folder.
+/// Where the lights of a map are saved: `--lights-file`, the file beside the map's own file, or that of the last game
+/// folder. `None`: nowhere, as for the sample.
 pub fn lights_path(
     chosen: Option<&PathBuf>,
-    map: &str,
+    map: Option<&str>,
     name: &str,
     games: &[PathBuf],
 ) -> Option<PathBuf> {
     if let Some(path) = chosen {
         return Some(path.clone());
     }
-    let file = Path::new(map);
+    let file = Path::new(map?);
     if file.is_file()
         && file
             .extension()
@@ -281,70 +282,9 @@ pub fn lights_path(
     Some(folder.join(format!("{stem}.lights")))
 }
 
-/// Projection of places to the picture.
-#[derive(Clone, Copy, Debug)]
-pub struct Screen {
-    /// World to clip space, y up.
-    to_clip: Mat4,
-    /// Left top corner and size of the view, points.
-    corner: Vec2,
-    size: Vec2,
-}
-
-impl Screen {
-    /// A view with these axes (forward, left, up) and full angles in degrees.
-    pub fn new(origin: Vec3, axis: [Vec3; 3], fov: [f32; 2], corner: Vec2, size: Vec2) -> Self {
-        let [forward, left, up] = axis;
-        let rows = [-left, up, forward].map(|row| row.extend(-row.dot(origin)));
-        let across = (fov[0].to_radians() * 0.5).tan().recip();
-        let down = (fov[1].to_radians() * 0.5).tan().recip();
-        let to_clip =
-            Mat4::from_cols(rows[0] * across, rows[1] * down, rows[2], Vec4::W).transpose();
-        Self {
-            to_clip,
-            corner,
-            size,
-        }
-    }
-
-    /// Where a place appears, points; `None` behind the camera.
-    pub fn place(&self, point: Vec3) -> Option<Vec2> {
-        let seen = self.to_clip * point.extend(1.0);
-        if seen.z < 1.0 {
-            return None;
-        }
-        let unit = Vec2::new(seen.x, -seen.y) / seen.z;
-        Some(self.corner + (unit * 0.5 + 0.5) * self.size)
-    }
-
-    /// Unit vector through a point of the picture, for axes and angles as in [`new`](Self::new).
-    pub fn ray(&self, axis: [Vec3; 3], fov: [f32; 2], at: Vec2) -> Vec3 {
-        let unit = (at - self.corner) / self.size * 2.0 - 1.0;
-        let [forward, left, up] = axis;
-        let across = (fov[0].to_radians() * 0.5).tan() * unit.x;
-        let down = (fov[1].to_radians() * 0.5).tan() * unit.y;
-        (forward - left * across - up * down).normalize()
-    }
-
-    /// Distance along a line through `from` with a unit `direction` for a motion of the pointer by `by` points.
-    pub fn along(&self, from: Vec3, direction: Vec3, by: Vec2) -> f32 {
-        let step = 1.0;
-        let (Some(a), Some(b)) = (self.place(from), self.place(from + direction * step)) else {
-            return 0.0;
-        };
-        let shown = (b - a) / step;
-        match shown.length_squared() {
-            // the line points at the camera
-            squared if squared < 1e-6 => 0.0,
-            squared => by.dot(shown) / squared,
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::view::Camera;
 
     fn lights() -> ChangeableLights {
         let (file, wrong) = LightsByHand::parse("point 1 2 3 100 1 0.5 0.25\nsun 1 1 1 50 10 20");
@@ -390,44 +330,15 @@ mod tests {
     }
 
     #[test]
-    fn places_and_rays_of_the_picture_agree() {
-        let camera = Camera {
-            origin: Vec3::new(10.0, -20.0, 30.0),
-            yaw: 37.0,
-            pitch: 12.0,
-        };
-        let (axis, fov) = (camera.axis(), [90.0, 60.0]);
-        let (corner, size) = (Vec2::new(5.0, 7.0), Vec2::new(640.0, 370.0));
-        let screen = Screen::new(camera.origin, axis, fov, corner, size);
-        for at in [
-            Vec2::new(325.0, 192.0),
-            Vec2::new(20.0, 300.0),
-            Vec2::new(600.0, 15.0),
-        ] {
-            let ray = screen.ray(axis, fov, at);
-            let place = screen.place(camera.origin + ray * 77.0).unwrap();
-            assert!(place.distance(at) < 0.01, "{place} {at}");
-        }
-        assert!(screen.place(camera.origin - axis[0] * 50.0).is_none());
-        // a drag along an axis moves the handle with the pointer
-        let from = camera.origin + axis[0] * 200.0;
-        let moved = screen.along(from, Vec3::Z, Vec2::new(0.0, -10.0));
-        let (a, b) = (
-            screen.place(from).unwrap(),
-            screen.place(from + Vec3::Z * moved).unwrap(),
-        );
-        assert!((b.y - a.y + 10.0).abs() < 0.7, "{a} {b}");
-    }
-
-    #[test]
     fn lights_are_saved_beside_the_map() {
         let folder = tempfile::tempdir().unwrap();
         let map = folder.path().join("room.bsp");
         std::fs::write(&map, "x").unwrap();
         let map = map.display().to_string();
         let game = vec![folder.path().to_owned()];
-        let path =
-            |chosen: Option<&PathBuf>, map: &str| lights_path(chosen, map, "maps/room.bsp", &game);
+        let path = |chosen: Option<&PathBuf>, map: &str| {
+            lights_path(chosen, Some(map), "maps/room.bsp", &game)
+        };
         assert_eq!(path(None, &map), Some(folder.path().join("room.lights")));
         assert_eq!(
             path(None, "room"),

@@ -1,9 +1,11 @@
 //! `relight view`: a window with a map.
 
 mod app;
+mod files;
 mod lights;
 mod panels;
 mod picked;
+mod picture;
 mod source;
 mod state;
 #[cfg(test)]
@@ -14,11 +16,10 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 
-use crate::game::Game;
+use crate::chosen::{ChosenCamera, ChosenMap};
 use crate::pictures::check_name;
-use crate::render::{parse_size, parse_view};
+use crate::render::parse_size;
 use crate::settings::SettingArgs;
-use crate::view::Camera;
 use state::{Shown, Start};
 
 /// Show a map in a window: fly and walk through it, compare looks, change settings and lights
@@ -30,14 +31,8 @@ use state::{Shown, Start};
 /// Examples: relight view oa_dm1; relight view my.bsp --look split; relight view --sample
 #[derive(Args, Debug)]
 pub struct ViewArgs {
-    /// The map: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp file, a pack (.pk3) with one map, or pack.pk3:maps/x.bsp
-    #[arg(required_unless_present = "sample", value_name = "MAP")]
-    map: Option<String>,
-    /// Use the built-in sample map
-    #[arg(long, conflicts_with = "map")]
-    sample: bool,
     #[command(flatten)]
-    game: Game,
+    chosen: ChosenMap,
     /// What is shown at first
     #[arg(
         long = "look",
@@ -50,13 +45,8 @@ pub struct ViewArgs {
     /// Size in pixels
     #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1280x720", value_parser = parse_size)]
     size: (u32, u32),
-    /// Camera: position in units, yaw and pitch (down) in degrees, which may be left out; default: the map's
-    /// intermission or first spawn point
-    #[arg(long, value_parser = parse_view, allow_hyphen_values = true, value_name = "X,Y,Z,YAW,PITCH")]
-    view: Option<Camera>,
-    /// View from a spawn point, counted from 0 in the map's order
-    #[arg(long, value_name = "N", conflicts_with = "view")]
-    spawn: Option<usize>,
+    #[command(flatten)]
+    place: ChosenCamera,
     /// File of lights that is read and saved in place of the one beside the map
     #[arg(long = "lights-file", value_name = "FILE")]
     lights: Option<PathBuf>,
@@ -100,11 +90,7 @@ pub fn run(args: &ViewArgs) -> Result<()> {
         "no folder for cached lights: neither XDG_CACHE_HOME nor HOME is set; name one with --cache DIR",
     )?;
     let source = source::Source {
-        map: args.map.clone(),
-        games: match args.sample {
-            true => Vec::new(),
-            false => args.game.paths.clone(),
-        },
+        chosen: args.chosen.clone(),
         lights: args.lights.clone(),
     };
     // errors of the map are reported before a window appears
@@ -114,8 +100,7 @@ pub fn run(args: &ViewArgs) -> Result<()> {
         cache,
         shown: args.look,
         settings: args.set.change([], renderer_vk::Settings::full_size()),
-        camera: args.view,
-        spawn: args.spawn,
+        place: args.place.clone(),
     };
     let options = app::WindowOptions {
         size: args.size,

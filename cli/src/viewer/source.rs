@@ -13,9 +13,8 @@ use relight::{
 };
 use renderer_vk::{Settings, map_options};
 
-use crate::game::Game;
+use crate::chosen::ChosenMap;
 use crate::scripts::load_scripts;
-use crate::view::open;
 
 /// Files that a map is made of.
 const WATCHED: [&str; 11] = [
@@ -28,10 +27,8 @@ const SETTLING: Duration = Duration::from_millis(250);
 /// Where the map comes from.
 #[derive(Clone, Debug)]
 pub struct Source {
-    /// The map as given; `None` for the sample.
-    pub map: Option<String>,
-    /// The game folders.
-    pub games: Vec<PathBuf>,
+    /// The map and its game.
+    pub chosen: ChosenMap,
     /// A file of lights that replaces the one of the map.
     pub lights: Option<PathBuf>,
 }
@@ -42,16 +39,7 @@ impl Source {
     /// # Errors
     /// A folder or the map cannot be read.
     pub fn open(&self) -> Result<(Arc<dyn GameFiles>, String)> {
-        let (files, name) = match &self.map {
-            None => {
-                let files = Arc::new(relight::sample::files()?) as Arc<dyn GameFiles>;
-                (files, relight::sample::MAP.to_owned())
-            }
-            Some(map) => {
-                let paths = self.games.clone();
-                open(map, &Game { paths })?
-            }
-        };
+        let (files, name) = self.chosen.open()?;
         let Some(path) = self.lights.as_ref().filter(|path| path.is_file()) else {
             return Ok((files, name));
         };
@@ -69,18 +57,25 @@ impl Source {
     /// Folders and files whose changes concern the map.
     fn watched(&self) -> Vec<(PathBuf, RecursiveMode)> {
         let mut watched = Vec::new();
-        for game in &self.games {
+        let Some(map) = &self.chosen.map else {
+            return watched; // the sample has no files
+        };
+        for game in &self.chosen.game.paths {
             watched.push((game.clone(), RecursiveMode::Recursive));
         }
         let parent = |path: &Path| match path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
             _ => PathBuf::from("."),
         };
-        let map = self.map.as_ref().map(|map| match map.split_once(".pk3:") {
+        let map = match map.split_once(".pk3:") {
             Some((pack, _)) => PathBuf::from(format!("{pack}.pk3")),
             None => PathBuf::from(map),
-        });
-        for file in map.iter().filter(|map| map.is_file()).chain(&self.lights) {
+        };
+        for file in [&map]
+            .into_iter()
+            .filter(|map| map.is_file())
+            .chain(&self.lights)
+        {
             watched.push((parent(file), RecursiveMode::NonRecursive));
         }
         watched
@@ -261,6 +256,15 @@ fn kind(path: &Path) -> Option<Changed> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::game::Game;
+
+    fn chosen(map: Option<String>) -> ChosenMap {
+        ChosenMap {
+            sample: map.is_none(),
+            map,
+            game: Game { paths: Vec::new() },
+        }
+    }
 
     #[test]
     fn changes_are_noticed_once_files_are_at_rest() {
@@ -268,8 +272,7 @@ mod tests {
         let map = folder.path().join("room.bsp");
         std::fs::write(&map, "x").unwrap();
         let source = Source {
-            map: Some(map.display().to_string()),
-            games: Vec::new(),
+            chosen: chosen(Some(map.display().to_string())),
             lights: None,
         };
         let mut changes = Changes::watch(&source, || ());
@@ -298,8 +301,7 @@ mod tests {
         let lights = folder.path().join("mine.lights");
         std::fs::write(&lights, "without suns").unwrap();
         let source = Source {
-            map: None,
-            games: Vec::new(),
+            chosen: chosen(None),
             lights: Some(lights),
         };
         let (files, name) = source.open().unwrap();
@@ -311,8 +313,7 @@ mod tests {
     fn lights_are_found_on_another_thread() {
         let folder = tempfile::tempdir().unwrap();
         let source = Source {
-            map: None,
-            games: Vec::new(),
+            chosen: chosen(None),
             lights: None,
         };
         let cache = CalibrationCache::new(folder.path());

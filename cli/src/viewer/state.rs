@@ -4,25 +4,25 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::ValueEnum;
 use glam::{UVec2, Vec2};
 use gui::egui::{self, PlatformOutput, RawInput};
-use gui::{Change, CostHistory, Gui, Motion};
+use gui::{Change, CostHistory, Gui, Motion, Screen};
+use relight::GameFiles;
 use relight::light::ChangeableLights;
 use relight::probe::Probe;
 use relight::viewpoints::Viewpoint;
-use relight::{CalibrationCache, GameFiles};
 use renderer_vk::api::{Look, Picture, RefDef, RefEntity};
 use renderer_vk::settings::{Given, Preset, flags, row};
 use renderer_vk::{Renderer, Settings};
 use shaderscript::Diagnostic;
 
-use super::lights::{Editor, Screen, lights_path};
+use super::lights::Editor;
 use super::picked::Picked;
-use super::source::{Changed, Changes, Finder, Progress, Source};
-use crate::scripts::load_scripts;
-use crate::view::{self, Camera};
+use super::source::{Changes, Finder, Source};
+use crate::chosen::ChosenCamera;
+use crate::view::Camera;
 
 /// What the window shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -48,9 +48,7 @@ pub struct Start {
     /// Settings at the start.
     pub settings: Settings,
     /// The first camera.
-    pub camera: Option<Camera>,
-    /// Spawn point of the first camera.
-    pub spawn: Option<usize>,
+    pub place: ChosenCamera,
 }
 
 /// Wakes the window's loop from another thread.
@@ -62,6 +60,19 @@ pub struct Frame {
     pub output: PlatformOutput,
     /// The next frame would be the same, unless something happens.
     pub at_rest: bool,
+}
+
+/// What is dragged over the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Handle {
+    /// The camera turns.
+    Camera,
+    /// The edge of the split screen.
+    Edge,
+    /// The selected light, along an axis.
+    Axis(usize),
+    /// The selected light, parallel to the picture.
+    Light,
 }
 
 /// The loaded map.
@@ -93,19 +104,18 @@ pub struct Viewer {
     pub(super) renderer: Renderer,
     pub(super) gui: Gui,
     pub(super) source: Source,
-    cache: PathBuf,
-    wake: Wake,
+    pub(super) cache: PathBuf,
+    pub(super) wake: Wake,
     stage: Stage,
     pub(super) shown: Shown,
     pub(super) settings: Settings,
     pub(super) motion: Motion,
-    camera: Option<Camera>,
-    spawn: Option<usize>,
+    pub(super) place: ChosenCamera,
     pub(super) map: Option<Map>,
     pub(super) finder: Option<Finder>,
     /// The lights of the map are known to the renderer.
-    found: bool,
-    changes: Changes,
+    pub(super) found: bool,
+    pub(super) changes: Changes,
     pub(super) editor: Option<Editor>,
     pub(super) lights_path: Option<PathBuf>,
     pub(super) picked: Option<Picked>,
@@ -123,13 +133,13 @@ pub struct Viewer {
     pub(super) split: f32,
     /// Frames of a reference.
     pub(super) wanted_frames: u32,
-    pub(super) dragged: Option<super::panels::Handle>,
+    pub(super) dragged: Option<Handle>,
     time: f32,
     /// Rectangle of the view in the newest frame, points.
     pub(super) view_rect: egui::Rect,
     /// Frames shown since the look is complete.
     complete_frames: u32,
-    title: Option<String>,
+    pub(super) title: Option<String>,
     opened: Instant,
     /// Seconds from the start to the first picture of the map.
     pub(super) first_picture: Option<f32>,
@@ -172,8 +182,7 @@ impl Viewer {
             shown: start.shown,
             settings,
             motion: Motion::new(Viewpoint::default()),
-            camera: start.camera,
-            spawn: start.spawn,
+            place: start.place,
             map: None,
             finder: None,
             found: false,
@@ -287,145 +296,6 @@ impl Viewer {
         self.found
     }
 
-    fn load(&mut self) -> Result<()> {
-        let (files, name) = self.source.open()?;
-        let (_, diagnostics) = load_scripts(&*files);
-        let loaded = view::load(
-            &mut self.renderer,
-            Arc::clone(&files),
-            &name,
-            &self.settings,
-        );
-        let (bsp, entities) = loaded?;
-        let mut cameras = Vec::new();
-        if let Some(camera) = Camera::of_map(&bsp) {
-            cameras.push(("intermission".to_owned(), camera));
-        }
-        let spawns = Camera::spawns(&bsp);
-        cameras.extend(
-            (0..)
-                .zip(&spawns)
-                .map(|(n, camera)| (format!("spawn {n}"), *camera)),
-        );
-        if let Some(number) = self.spawn.take() {
-            let spawn = spawns.get(number).copied();
-            let count = spawns.len();
-            self.camera = Some(spawn.with_context(|| {
-                format!("no spawn point {number}: the map has {count}, counted from 0")
-            })?);
-        }
-        let relit = &self.renderer.world().context("no map")?.relit;
-        let overview = Camera::overview(relit, self.renderer.size(), FOV);
-        if let Some(camera) = overview {
-            cameras.push(("overview".to_owned(), camera));
-        }
-        let kept = (self.map.is_some()).then_some(Camera::from(self.motion.camera));
-        let first = cameras.first().map(|(_, camera)| *camera);
-        let camera = kept.or(self.camera.take()).or(first);
-        self.motion.camera = camera.unwrap_or_default().into();
-        let given = self.source.map.clone().unwrap_or_default();
-        self.lights_path = lights_path(
-            self.source.lights.as_ref(),
-            &given,
-            &name,
-            &self.source.games,
-        );
-        self.title = Some(format!("{} – Relight", view::map_name(&name)));
-        self.map = Some(Map {
-            name,
-            files,
-            diagnostics,
-            entities,
-            cameras,
-            probe: None,
-        });
-        self.picked = None;
-        self.editor = None;
-        self.found = false;
-        self.finder = None;
-        Ok(())
-    }
-
-    /// Loads the map again after a change; the picture before stays if that fails.
-    fn reload(&mut self) {
-        match self.load() {
-            Ok(()) => self.message = Some("reloaded: files have changed".to_owned()),
-            Err(e) => self.message = Some(format!("not reloaded: {e:#}")),
-        }
-    }
-
-    /// Begins the search for lights, or takes over its result.
-    fn follow_finder(&mut self) {
-        if self.map.is_none() || self.found || self.shown == Shown::Classic {
-            return;
-        }
-        let finder = self.finder.get_or_insert_with(|| {
-            let wake = Arc::clone(&self.wake);
-            Finder::begin(
-                self.source.clone(),
-                CalibrationCache::new(&self.cache),
-                self.settings.clone(),
-                move || wake(),
-            )
-        });
-        match finder.update() {
-            Progress::Part(_) => {}
-            Progress::Found => self.found = true,
-            Progress::Failed(why) => {
-                // the renderer then searches by itself
-                self.message = Some(why.clone());
-                self.found = true;
-            }
-        }
-    }
-
-    /// Reloads what has changed on disk; whether changes are being collected.
-    fn follow_files(&mut self) -> bool {
-        let (changed, collecting) = self.changes.take();
-        let own = self.editor.as_ref().is_some_and(Editor::is_changed);
-        match changed {
-            None => {}
-            Some(Changed::Lights) if own => {
-                self.message =
-                    Some("the file of lights has changed on disk; yours are not saved".to_owned());
-            }
-            Some(Changed::Lights) => self.reload_lights(),
-            Some(Changed::Map) => self.reload(),
-        }
-        collecting
-    }
-
-    /// Reads the lights by hand again.
-    fn reload_lights(&mut self) {
-        let read = || -> Result<_> {
-            let (files, name) = self.source.open()?;
-            let stem = name.strip_suffix(".bsp").unwrap_or(&name).to_owned();
-            let path = format!("{stem}.lights");
-            let bytes = files.read(&path)?.unwrap_or_default();
-            let text = String::from_utf8_lossy(&bytes).into_owned();
-            Ok((relight::light::LightsByHand::parse(&text), path))
-        };
-        match read() {
-            Ok(((file, wrong), path)) => {
-                let same = (self.editor.as_ref()).is_some_and(|editor| editor.file() == file);
-                if same {
-                    return; // saved here
-                }
-                let changed = self.renderer.light_by_hand(&file);
-                self.editor = None;
-                self.message = Some(match (changed, wrong.first()) {
-                    (Err(e), _) => e.to_string(),
-                    (Ok(_), Some(wrong)) => format!("{path}: {wrong}"),
-                    (Ok(changed), None) => match changed.unknown.first() {
-                        Some(name) => format!("{path}: material {name} is not in the map"),
-                        None => "lights reloaded".to_owned(),
-                    },
-                });
-            }
-            Err(e) => self.message = Some(format!("{e:#}")),
-        }
-    }
-
     /// The list of lights, once they are found and traced.
     pub(super) fn prepare_editor(&mut self) {
         if self.editor.is_none() && self.renderer.is_ready_to_trace() {
@@ -529,11 +399,10 @@ impl Viewer {
     pub(super) fn screen(&self) -> Option<Screen> {
         let def = self.view()?;
         let rect = self.view_rect;
-        Some(Screen::new(
-            def.view_origin,
-            def.view_axis,
-            [def.fov_x, def.fov_y],
-            Vec2::new(rect.left(), rect.top()),
+        let corner = Vec2::new(rect.left(), rect.top());
+        Some(Screen::of(
+            &def,
+            corner,
             Vec2::new(rect.width(), rect.height()),
         ))
     }
@@ -541,17 +410,16 @@ impl Viewer {
     /// Names the surface at a place of the window, points.
     pub(super) fn pick(&mut self, at: Vec2) {
         self.prepare_probe();
-        let (Some(screen), Some(def)) = (self.screen(), self.view()) else {
+        let Some(screen) = self.screen() else {
             return;
         };
-        let ray = screen.ray(def.view_axis, [def.fov_x, def.fov_y], at);
         let (Some(map), Some(world)) = (&self.map, self.renderer.world()) else {
             return;
         };
         let Some(probe) = &map.probe else {
             return;
         };
-        let met = probe.surface(def.view_origin, ray);
+        let met = probe.surface(self.motion.camera.origin, screen.ray(at));
         self.picked = met
             .and_then(|met| Picked::new(&world.relit, probe, met, &*map.files, &map.diagnostics));
     }
@@ -564,7 +432,9 @@ impl Viewer {
         self.renderer.set_settings(&self.settings);
         self.renderer.begin_frame((self.time * 1000.0) as i32);
         let def = self.view();
-        if let (Some(def), Some(map)) = (def, &self.map) {
+        // after a failed reload there may be none
+        let loaded = self.renderer.world().is_some();
+        if let (Some(def), Some(map), true) = (def, &self.map, loaded) {
             let mut view = |def: &RefDef| {
                 self.renderer.clear_scene();
                 for entity in &map.entities {

@@ -11,6 +11,8 @@ use renderer_vk::{Renderer, RendererOptions, Settings};
 
 use super::source::Source;
 use super::state::{Shown, Start, Viewer};
+use crate::chosen::{ChosenCamera, ChosenMap};
+use crate::game::Game;
 
 const SIZE: (u32, u32) = (480, 270);
 
@@ -33,16 +35,21 @@ fn write_sample(folder: &Path) {
     }
 }
 
-/// A viewer of the sample in a folder; `None` without a device.
-fn viewer(folder: &Path) -> Option<Viewer> {
+/// A viewer of the sample in a folder, by this name; `None` without a device.
+fn viewer(folder: &Path, map: &str) -> Option<Viewer> {
     let renderer = testkit::device(Renderer::new(RendererOptions {
         validation: true,
         ..RendererOptions::headless(SIZE.0, SIZE.1)
     }))?;
     let start = Start {
         source: Source {
-            map: Some(folder.join(sample::MAP).display().to_string()),
-            games: vec![folder.to_owned()],
+            chosen: ChosenMap {
+                map: Some(map.to_owned()),
+                sample: false,
+                game: Game {
+                    paths: vec![folder.to_owned()],
+                },
+            },
             lights: None,
         },
         cache: folder.join("cache"),
@@ -51,8 +58,10 @@ fn viewer(folder: &Path) -> Option<Viewer> {
             rt_scale: 0.5,
             ..Settings::full_size()
         },
-        camera: None,
-        spawn: Some(0),
+        place: ChosenCamera {
+            view: None,
+            spawn: Some(0),
+        },
     };
     let mut viewer = Viewer::new(renderer, start, Box::new(|| ())).unwrap();
     for _ in 0..3 {
@@ -145,7 +154,8 @@ fn difference(a: &Picture, b: &Picture, from: u32, to: u32) -> f64 {
 fn mouse_and_keys_move_pick_and_split() {
     let folder = tempfile::tempdir().unwrap();
     write_sample(folder.path());
-    let Some(mut viewer) = viewer(folder.path()) else {
+    let map = folder.path().join(sample::MAP).display().to_string();
+    let Some(mut viewer) = viewer(folder.path(), &map) else {
         return;
     };
     // with the panel, then without: the view is wider
@@ -210,7 +220,8 @@ fn mouse_and_keys_move_pick_and_split() {
 fn lights_are_changed_saved_and_reloaded() {
     let folder = tempfile::tempdir().unwrap();
     write_sample(folder.path());
-    let Some(mut viewer) = viewer(folder.path()) else {
+    // by its name in the game: only loading reads it
+    let Some(mut viewer) = viewer(folder.path(), "sample") else {
         return;
     };
     press(&mut viewer, Key::H);
@@ -288,6 +299,10 @@ fn lights_are_changed_saved_and_reloaded() {
             .as_deref()
             .is_some_and(|m| m.starts_with("not reloaded: "))
     });
+    // the map before is still shown
+    frame(&mut viewer, []);
+    let kept = viewer.picture().unwrap();
+    assert!(mean(&kept) > 1.0);
     write_sample(folder.path());
     until(&mut viewer, "the map is not reloaded", |viewer| {
         viewer.message.as_deref() == Some("reloaded: files have changed")

@@ -22,6 +22,8 @@ pub type Vec3C = [c_float; 3];
 
 /// `cbufExec_t`: runs when the engine next executes its command buffer.
 pub const EXEC_APPEND: c_int = 2;
+/// `cbufExec_t`: runs next, before what the buffer holds.
+pub const EXEC_INSERT: c_int = 1;
 /// `stereoFrame_t` of the first eye.
 pub const STEREO_LEFT: c_int = 1;
 /// `stereoFrame_t` of the second eye.

@@ -7,6 +7,7 @@ use crate::capture::free_path;
 use crate::delivery::Outbox;
 use crate::engine::{self, Engine, valid_game_path};
 use crate::failure::Failure;
+use crate::panel::Panel;
 use crate::session::{Front, with_renderer};
 use relight::viewpoints;
 use renderer_vk::path::{self, PathPoint};
@@ -22,7 +23,7 @@ pub const IN_PROGRESS: &str = "a benchmark is measuring; rt_benchmark stop ends 
 
 const USAGE: &str = "usage: rt_benchmark [NAME of a path of rt_path | demo NAME | stop]";
 
-/// What the player asks for.
+/// What the command's words request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Order {
     FlyThrough,
@@ -114,6 +115,8 @@ fn obstacle(front: &Front) -> Option<&'static str> {
         Some(IN_PROGRESS)
     } else if front.captures.still.is_some() {
         Some("rt_screenshot is drawing: wait until it has written its picture")
+    } else if matches!(front.panel, Some(Panel::Photo(_))) {
+        Some("photo mode keeps the picture still: give rt_photo to end it first")
     } else if settings.rt && settings.rt_pause {
         Some("rt_pause keeps the picture still: set rt_pause 0 first")
     } else if settings.no_refresh || settings.skip_back_end {
@@ -123,7 +126,7 @@ fn obstacle(front: &Front) -> Option<&'static str> {
     }
 }
 
-/// Begins to measure a path; what to tell the player.
+/// Begins to measure a path; returns a line for the player.
 fn begin_path(
     route: &str,
     points: impl FnOnce(&Renderer) -> Option<Vec<PathPoint>>,
@@ -147,7 +150,7 @@ fn begin_path(
     })
 }
 
-/// Lets the game play a demo, and measures it; what to tell the player.
+/// Has the game play a demo, and measures it; returns a line for the player.
 fn begin_demo(engine: Engine, name: &str) -> Result<String, Failure> {
     if !is_demo_name(name) {
         return Ok(
@@ -164,7 +167,8 @@ fn begin_demo(engine: Engine, name: &str) -> Result<String, Failure> {
         Ok((line, true))
     })?;
     if let (true, Ok(command)) = (begun, CString::new(format!("demo {name}\n"))) {
-        engine.append_command(&command);
+        // before what a configuration file has after this command
+        engine.insert_command(&command);
     }
     Ok(line)
 }
@@ -240,12 +244,7 @@ fn finish(renderer: &Renderer, front: &mut Front, step: Step, outbox: &mut Outbo
         (&renderer.device_info().driver, &costs),
         benchmark.samples(),
     );
-    let exists = |path: &str| {
-        let name = CString::new(path).ok();
-        engine::current()
-            .zip(name)
-            .is_some_and(|(engine, name)| engine.home_file_exists(&name))
-    };
+    let exists = |path: &str| engine::current().is_some_and(|engine| engine.home_has(path));
     match free_path(&file_stem(map), "json", &mut 0, exists) {
         Some(path) => outbox.files.push((path, report.json().into_bytes(), false)),
         None => (outbox.lines).push("rt_benchmark: all 10000 file names are taken".to_owned()),

@@ -7,7 +7,7 @@ use super::{
     Engine, FrontEnd, TABLE, Table, Variable, VariableLayout, WindowServices, print, string_from,
     valid_path_to_write,
 };
-use crate::abi::{CIN_MATERIAL, EXEC_APPEND, is_true};
+use crate::abi::{CIN_MATERIAL, EXEC_APPEND, EXEC_INSERT, is_true};
 use crate::system;
 use std::ffi::{CStr, CString, c_char, c_float, c_int, c_uchar, c_void};
 use std::num::IntErrorKind;
@@ -278,9 +278,18 @@ impl Engine {
 
     /// Appends text to the engine's command buffer.
     pub fn append_command(self, text: &CStr) {
+        self.buffer_command(EXEC_APPEND, text);
+    }
+
+    /// Inserts text before the commands that the engine's buffer holds.
+    pub fn insert_command(self, text: &CStr) {
+        self.buffer_command(EXEC_INSERT, text);
+    }
+
+    fn buffer_command(self, place: c_int, text: &CStr) {
         if let Some(f) = self.get(|t| t.cmd_execute_text) {
-            // SAFETY: the text is copied. Appended text runs later, not from inside this call.
-            unsafe { f(EXEC_APPEND, text.as_ptr()) }
+            // SAFETY: the text is copied. Text of the buffer runs later, not from inside this call.
+            unsafe { f(place, text.as_ptr()) }
         }
     }
 
@@ -364,6 +373,11 @@ impl Engine {
         // SAFETY: name and contents are valid during the call.
         unsafe { f(name.as_ptr(), contents.as_ptr().cast(), length) };
         self.home_file_exists(&name)
+    }
+
+    /// Whether a file with this path is in the user's game folder; no path with a NUL is.
+    pub fn home_has(self, path: &str) -> bool {
+        CString::new(path).is_ok_and(|path| self.home_file_exists(&path))
     }
 
     /// Whether the user's game folder contains this file (packs are not searched).

@@ -23,8 +23,7 @@ impl Photo {
                 if let Some((part, text)) = progress {
                     ui.add(ProgressBar::new(*part).text(text));
                     if ui.button("Cancel").clicked() {
-                        self.job = None;
-                        self.message = Some("cancelled".to_owned());
+                        actions.push(Action::Cancel);
                     }
                     return;
                 }

@@ -1,7 +1,5 @@
 //! `rt_menu`: a menu over any game, drawn by the renderer, with mouse and keys.
 
-pub mod pointer;
-
 use std::time::Instant;
 
 use gui::egui::{self, Context, RichText};
@@ -9,8 +7,8 @@ use gui::{Change, CostHistory, Gui, frame_time, main_settings, presets};
 use renderer_vk::Settings;
 use renderer_vk::api::UiFrame;
 
+use super::pointer::{self, Pointer};
 use crate::window::input::Input;
-use pointer::Pointer;
 
 /// What the player chose.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,20 +1,20 @@
 //! `rt_photo`: the scene stands still, a free camera, depth of field and exposure, pictures of any size.
 
-mod panel;
 pub mod panorama;
+mod settings;
 
 use std::time::{Duration, Instant};
 
-use glam::{Mat3, Vec2, Vec3};
+use glam::{Mat3, Vec2};
 use gui::egui::{self, Pos2};
-use gui::{Gui, Motion};
+use gui::{Gui, Motion, Screen};
 use relight::probe::Probe;
 use relight::viewpoints::Viewpoint;
 use renderer_vk::api::{FreeCamera, Picture, RefDef, StillPicture, UiFrame};
 use renderer_vk::picture_files::{open_exr, png};
 use renderer_vk::{Renderer, Settings};
 
-use crate::menu::pointer::{self, Pointer};
+use crate::panel::pointer::{self, Pointer};
 use crate::window::input::Input;
 
 /// Time without motion after which frames are averaged.
@@ -56,6 +56,8 @@ impl Kind {
 pub enum Action {
     /// A picture is taken.
     Take(Kind),
+    /// The picture in progress is cancelled.
+    Cancel,
     /// Photo mode ends.
     Close,
 }
@@ -204,9 +206,12 @@ impl Photo {
         }
     }
 
-    /// Whether a picture is in progress.
-    pub fn is_taking(&self) -> bool {
-        self.job.is_some()
+    /// Cancels the picture in progress.
+    pub fn cancel(&mut self, renderer: &mut Renderer) {
+        if self.job.take().is_some_and(|job| job.step != Step::Wanted) {
+            renderer.cancel_still();
+            self.message = Some("cancelled".to_owned());
+        }
     }
 
     /// Requests a picture, as the panel does; `samples`: those of this and later ones.
@@ -301,9 +306,10 @@ impl Photo {
                     return Ok(None);
                 }
                 let joined = panorama::join(&job.faces, width & !1, yaw);
-                png(&joined.ok_or("the views have different sizes")?)
+                let joined = joined.ok_or("the views have different sizes")?;
+                png(&joined.rgb, joined.width, joined.height)
             }
-            (Kind::Png | Kind::Exr, _) => png(&picture),
+            (Kind::Png | Kind::Exr, _) => png(&picture.rgb, picture.width, picture.height),
         };
         let bytes = bytes.map_err(|e| e.to_string())?;
         Ok(Some((job.path.clone(), bytes)))
@@ -384,19 +390,16 @@ impl Photo {
         let Some(world) = renderer.world() else {
             return;
         };
+        let (low, size) = (screen.min, screen.size());
+        let [low, size] = [Vec2::new(low.x, low.y), Vec2::new(size.x, size.y)];
+        let across = (self.lens.fov.to_radians() * 0.5).tan() * size.x / size.y;
+        let fov = [across.atan().to_degrees() * 2.0, self.lens.fov];
+        let FreeCamera { origin, axis, .. } = self.camera();
+        let ray = Screen::new(origin, axis, fov, low, size).ray(Vec2::new(at.x, at.y));
         let probe = self.probe.get_or_insert_with(|| Probe::new(&world.relit));
-        let tan = (self.lens.fov.to_radians() * 0.5).tan();
-        let unit = (at - screen.center()) / (screen.height() * 0.5) * tan;
-        let camera = {
-            let [forward, left, up] = self.motion.camera.axis();
-            let roll = Mat3::from_axis_angle(forward, self.lens.roll.to_radians());
-            [forward, roll * left, roll * up]
-        };
-        let [forward, left, up] = camera;
-        let ray: Vec3 = (forward - left * unit.x - up * unit.y).normalize();
-        if let Some(met) = probe.surface(self.motion.camera.origin, ray) {
+        if let Some(met) = probe.surface(origin, ray) {
             // distance of the plane of focus
-            self.lens.focus = (met.distance * ray.dot(forward)).clamp(1.0, 65536.0);
+            self.lens.focus = (met.distance * ray.dot(axis[0])).clamp(1.0, 65536.0);
             self.message = Some(format!("sharp at {:.0} units", self.lens.focus));
         }
     }
