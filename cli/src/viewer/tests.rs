@@ -55,7 +55,7 @@ fn viewer(folder: &Path, map: &str) -> Option<Viewer> {
         cache: folder.join("cache"),
         shown: Shown::Classic,
         settings: Settings {
-            rt_scale: 0.5,
+            rt_scale: 0.25,
             ..Settings::full_size()
         },
         place: ChosenCamera {
@@ -236,7 +236,7 @@ fn lights_are_changed_saved_and_reloaded() {
     editor.ambient = glam::Vec3::ZERO;
     viewer.settings.rt_auto_exposure = false;
     viewer.apply_lights();
-    for _ in 0..24 {
+    for _ in 0..16 {
         frame(&mut viewer, []);
     }
     let dark = viewer.picture().unwrap();
@@ -267,7 +267,7 @@ fn lights_are_changed_saved_and_reloaded() {
     let now = viewer.screen().unwrap().place(moved).unwrap();
     assert!(now.distance(expected) < 2.0, "{now} {expected}");
     viewer.panel = false;
-    for _ in 0..24 {
+    for _ in 0..16 {
         frame(&mut viewer, []);
     }
     let lit = viewer.picture().unwrap();
