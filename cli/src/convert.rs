@@ -395,7 +395,7 @@ fn report(args: &ConvertArgs, converted: &[Converted], failures: &[Failure]) -> 
                     0 => String::new(),
                     _ if args.verbose => ":".to_owned(),
                     1 => "; 1 warning".to_owned(),
-                    count => format!("; {count} warnings"),
+                    count => format!("; {count} warnings (--verbose lists them)"),
                 }
             );
             for warning in one.warnings.iter().filter(|_| args.verbose) {

@@ -122,7 +122,7 @@ unsafe extern "C" fn timings() {
     print_lines(|renderer, _, _| {
         let passes = renderer.timings();
         if passes.is_empty() {
-            return vec!["no finished frame was timed yet".into()];
+            return vec!["no frame was timed yet: ask again after some frames".into()];
         }
         let total: f32 = passes.iter().map(|(_, ms)| ms).sum();
         let mut lines: Vec<_> = passes
@@ -263,7 +263,8 @@ unsafe extern "C" fn report() {
         engine.say(&match zip {
             Some(Ok(bytes)) if engine.write_file(&path, &bytes) => {
                 format!(
-                    "Wrote {path}: send this file with your question; nothing personal is in it\n"
+                    "Wrote {path} in the game's own folder: send this file with your question. Its text names nobody; its \
+                     picture shows what was on the screen\n"
                 )
             }
             Some(Ok(_)) => format!("{path} could not be written\n"),

@@ -135,7 +135,7 @@ fn start_renderer(
                 match (info.ray_tracing.is_some(), info.software) {
                     (true, false) => "this graphics driver has ray tracing",
                     (_, true) =>
-                        "this driver draws on the processor; a traced frame takes a second or more",
+                        "this driver draws on the processor: give rt_preset low before r_rt 1; a traced frame takes a second or more",
                     (false, false) =>
                         "this graphics driver has no ray tracing; using compute shaders",
                 }

@@ -5,7 +5,7 @@ use crate::boundary::entry;
 use crate::convert;
 pub use crate::convert::ShaderTime;
 use crate::cvars::{self, Cvar, Cvars};
-use crate::engine::{self, string_from};
+use crate::engine::{self, Engine, string_from, valid_game_path};
 use crate::failure::Failure;
 use crate::session::{draw, with_renderer};
 use glam::{IVec2, Vec2, Vec3};
@@ -117,8 +117,24 @@ pub unsafe extern "C" fn load_world(name: *const c_char) {
                 renderer.set_settings(&front.settings);
             }
             renderer.load_world(&name).map_err(Failure::from)
-        })
+        })?;
+        if let Some(line) = engine::current().and_then(|engine| unread_lights(engine, &name)) {
+            engine::current().inspect(|engine| engine.say(&line));
+        }
+        Ok(())
     });
+}
+
+/// What to print where the player has a file of lights that the engine does not read, as on a pure server.
+fn unread_lights(engine: Engine, map: &str) -> Option<String> {
+    let lights = relight::light::lights_file(map);
+    let unread = engine.home_has(&lights) && engine.read_file(&valid_game_path(&lights)?).is_none();
+    unread.then(|| {
+        format!(
+            "{lights} is not used: a pure server reads packs only. Give \\sv_pure 0 before the map starts, or put the \
+             file into a .pk3\n"
+        )
+    })
 }
 
 /// `re.SetWorldVisData`, the engine's copy of the map's visibility. The renderer reads the same data from the map

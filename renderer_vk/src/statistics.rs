@@ -153,7 +153,7 @@ impl Costs {
         let tracer = self.tracer.as_deref().unwrap_or("no tracer");
         let mut lines = vec![format!("{}, {width} x {height}, {tracer}", self.device)];
         if self.passes.is_empty() {
-            lines.push("no finished frame was timed yet".into());
+            lines.push("no frame was timed yet: ask again after some frames".into());
         }
         for pass in self.passes.iter().chain([&self.total()]) {
             let rays = match (pass.rays, pass.mrays_per_second()) {

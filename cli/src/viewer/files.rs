@@ -126,8 +126,7 @@ impl Viewer {
     fn reload_lights(&mut self) {
         let read = || -> Result<_> {
             let (files, name) = self.source.open()?;
-            let stem = name.strip_suffix(".bsp").unwrap_or(&name).to_owned();
-            let path = format!("{stem}.lights");
+            let path = relight::light::lights_file(&name);
             let bytes = files.read(&path)?.unwrap_or_default();
             let text = String::from_utf8_lossy(&bytes).into_owned();
             Ok((relight::light::LightsByHand::parse(&text), path))

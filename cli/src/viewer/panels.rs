@@ -247,14 +247,19 @@ impl Viewer {
                 ui.strong(&picked.material);
                 let defined = picked.defined.as_deref();
                 ui.weak(defined.unwrap_or("no script; a bare image"));
-                egui::Grid::new("facts").show(ui, |ui| {
-                    for (name, value) in &picked.facts {
-                        ui.label(*name);
-                        ui.label(value);
-                        ui.end_row();
-                    }
-                });
+                egui::Grid::new("facts")
+                    .max_col_width(PANEL * 0.6)
+                    .show(ui, |ui| {
+                        for (name, value) in &picked.facts {
+                            ui.label(*name);
+                            ui.label(value);
+                            ui.end_row();
+                        }
+                    });
                 ui.label("Light that reaches this place:");
+                if !self.found {
+                    ui.weak("Its lamps are not found yet: choose Traced, then click again.");
+                }
                 egui::Grid::new("arriving").striped(true).show(ui, |ui| {
                     for line in &picked.light {
                         let [r, g, b] = line.color;

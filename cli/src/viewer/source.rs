@@ -46,8 +46,7 @@ impl Source {
         let bytes =
             std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
         let mut front = relight::MemoryFiles::new();
-        let stem = name.strip_suffix(".bsp").unwrap_or(&name);
-        front.insert(&format!("{stem}.lights"), bytes)?;
+        front.insert(&relight::light::lights_file(&name), bytes)?;
         // the renderer takes an `Arc`; no other thread gets it
         #[allow(clippy::arc_with_non_send_sync)]
         let files = Arc::new(Overlay { front, back: files });
@@ -79,6 +78,29 @@ impl Source {
             watched.push((parent(file), RecursiveMode::NonRecursive));
         }
         watched
+    }
+
+    /// Whether the map may use this file. The folder of a single file holds others, too.
+    fn concerns(&self, path: &Path) -> bool {
+        if self
+            .chosen
+            .game
+            .paths
+            .iter()
+            .any(|game| path.starts_with(game))
+        {
+            return true;
+        }
+        let map = self.chosen.map.as_deref().unwrap_or_default();
+        let map = map
+            .split_once(".pk3:")
+            .map_or(map.to_owned(), |(pack, _)| format!("{pack}.pk3"));
+        let names = [
+            PathBuf::from(relight::light::lights_file(&map)),
+            PathBuf::from(map),
+        ];
+        let mut names = names.iter().chain(&self.lights);
+        names.any(|name| name.file_name() == path.file_name())
     }
 }
 
@@ -200,6 +222,7 @@ impl Changes {
     /// Watches the files of a map. Failures are warnings: the viewer works without. `wake` is called after a change.
     pub fn watch(source: &Source, wake: impl Fn() + Send + 'static) -> Self {
         let (sender, receiver) = channel();
+        let watched = source.clone();
         let watcher = notify::recommended_watcher(move |event: notify::Result<notify::Event>| {
             let Ok(event) = event else {
                 return;
@@ -208,9 +231,10 @@ impl Changes {
                 return;
             }
             for path in event.paths {
-                let _ = sender.send(path);
+                if watched.concerns(&path) && sender.send(path).is_ok() {
+                    wake();
+                }
             }
-            wake();
         });
         let mut watcher = watcher
             .inspect_err(|e| log::warn!("changes of files are not noticed: {e}"))
@@ -287,7 +311,9 @@ mod tests {
             None
         };
         std::fs::write(folder.path().join("room.lights"), "point").unwrap();
+        // the map uses neither
         std::fs::write(folder.path().join("notes.txt"), "y").unwrap();
+        std::fs::write(folder.path().join("shot.png"), "y").unwrap();
         assert_eq!(wait(&mut changes), Some(Changed::Lights));
         std::fs::write(folder.path().join("room.lights"), "point").unwrap();
         std::fs::write(&map, "z").unwrap();

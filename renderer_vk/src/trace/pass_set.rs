@@ -1,6 +1,7 @@
 //! The compiled pipelines of the traced look's passes, one set per device and tracer, shared by all maps and views.
 
 use std::sync::OnceLock;
+use std::time::Instant;
 
 use super::passes::{Pass, Shader, Switch, TABLE};
 use super::tracer::Tracer;
@@ -141,7 +142,20 @@ impl PassSet {
         let jobs: Vec<_> = variants
             .map(|(pass, on)| Late::new(move || self.get(pass, on).map(|_| ())))
             .collect();
+        let begin = Instant::now();
+        if self.device.info().software {
+            log::info!(
+                "preparing {} shaders of the traced look: minutes the first time, for a driver that draws on the processor",
+                jobs.len()
+            );
+        }
         make_all(&jobs.iter().map(|job| job as &dyn Make).collect::<Vec<_>>());
+        let seconds = begin.elapsed().as_secs_f32();
+        if seconds > 2.0 {
+            log::info!(
+                "prepared the shaders of the traced look in {seconds:.0} s; the driver keeps them"
+            );
+        }
         jobs.into_iter().try_for_each(Late::take)
     }
 }

@@ -362,7 +362,9 @@ impl World {
             }
         }
         self.before_hand = Some(relit.lighting());
-        relit.light_by_hand(&*files);
+        if relit.light_by_hand(&*files) {
+            log::info!("{}: lights as in {}", relit.name, relit.lights_file());
+        }
         let swept = relight::light::sweep(relit, cache);
         for warning in relit.warnings.iter().skip(warned) {
             log::warn!("{}: {warning}", relit.name);

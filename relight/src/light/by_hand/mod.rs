@@ -216,22 +216,27 @@ impl LightsByHand {
     }
 }
 
+/// Game path of the light file of a map: its own path with the extension `.lights`.
+pub fn lights_file(map: &str) -> String {
+    let stem = map.strip_suffix(".bsp").unwrap_or(map);
+    format!("{stem}.lights")
+}
+
 impl RelitWorld {
     /// Game path of the map's light file: the map's own with the extension `.lights`.
     pub fn lights_file(&self) -> String {
-        let stem = self.name.strip_suffix(".bsp").unwrap_or(&self.name);
-        format!("{stem}.lights")
+        lights_file(&self.name)
     }
 
-    /// Applies the [file](LightsByHand) beside the map, if there is one. Its errors become warnings of the world.
-    pub fn light_by_hand(&mut self, files: &dyn GameFiles) {
+    /// Applies the [file](LightsByHand) beside the map; whether there is one. Its errors become warnings of the world.
+    pub fn light_by_hand(&mut self, files: &dyn GameFiles) -> bool {
         let path = self.lights_file();
         let bytes = match files.read(&path) {
             Ok(Some(bytes)) => bytes,
-            Ok(None) => return,
+            Ok(None) => return false,
             Err(problem) => {
                 self.warnings.push(problem.to_string());
-                return;
+                return false;
             }
         };
         let (file, wrong) = LightsByHand::parse(&String::from_utf8_lossy(&bytes));
@@ -242,6 +247,7 @@ impl RelitWorld {
             .iter()
             .map(|name| format!("{path}: material {name} is not in the map"));
         self.warnings.extend(unknown);
+        true
     }
 }
 
