@@ -549,10 +549,9 @@ impl Engine {
         self.command("screenshot picture")?;
         self.end_frame()?;
         let file = "screenshots/picture.tga";
-        let bytes = self
-            .read_file(file)
-            .unwrap_or_else(|| panic!("no {file} was written"));
-        let _ = std::fs::remove_file(self.home().join(file));
+        let written = self.home().join(file);
+        let bytes = std::fs::read(&written).unwrap_or_else(|e| panic!("{file}: {e}"));
+        let _ = std::fs::remove_file(written);
         let image = relight::image::decode(file, "tga", &bytes).expect("a picture");
         let pixels = image.pixels().flat_map(|[r, g, b, _]| [r, g, b]).collect();
         Ok(Rgb8::new(image.width as usize, image.height as usize, pixels).expect("its size"))

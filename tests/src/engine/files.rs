@@ -59,6 +59,7 @@ pub struct Files {
     memory: BTreeMap<String, Vec<u8>>,
     packs: Packs,
     home: PathBuf,
+    pure: bool,
 }
 
 /// Names compare without case, and a backslash is a slash.
@@ -77,7 +78,13 @@ impl Files {
             memory,
             packs,
             home,
+            pure: false,
         }
+    }
+
+    /// From now on only packs (and the memory, which stands for one) are read, as on a pure server.
+    pub fn read_packs_only(&mut self) {
+        self.pure = true;
     }
 
     /// Adds or replaces a file in memory.
@@ -98,6 +105,9 @@ impl Files {
                 archive.by_index(i).ok()?.read_to_end(&mut bytes).ok()?;
                 return Some(bytes);
             }
+        }
+        if self.pure {
+            return None;
         }
         std::fs::read(self.home.join(&name)).ok()
     }

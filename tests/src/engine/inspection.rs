@@ -71,6 +71,11 @@ impl Engine {
         imports::with(|s| s.files.read(name)).flatten()
     }
 
+    /// From now on only packs are read, as on a pure server.
+    pub fn read_packs_only(&mut self) {
+        imports::with(|s| s.files.read_packs_only());
+    }
+
     /// What `FS_ListFiles` gives.
     pub fn list_files(&self, dir: &str, extension: &str) -> Vec<String> {
         imports::with(|s| s.files.list(dir, extension)).unwrap_or_default()

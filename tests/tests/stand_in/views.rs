@@ -392,6 +392,28 @@ fn lights_of_the_map_can_be_chosen_while_playing() {
 }
 
 #[test]
+fn a_file_of_lights_is_named_when_it_is_used_and_when_it_is_not() {
+    for pure in [false, true] {
+        let mut engine = engine();
+        let maps = engine.home().join("maps");
+        std::fs::create_dir_all(&maps).unwrap();
+        std::fs::write(maps.join("rooms.lights"), "ambient 40 1 1 1\n").unwrap();
+        if pure {
+            engine.read_packs_only();
+        }
+        engine.set("r_rt", "1");
+        engine.set("rt_lights", "prior");
+        engine.start_map(ROOMS).unwrap();
+        engine.picture(&View::new(HERE, 30.0)).unwrap();
+        let printed = text_of(&engine.take_messages());
+        let used = printed.contains("lights as in maps/rooms.lights");
+        let ignored = printed.contains("maps/rooms.lights is not used: a pure server");
+        assert_eq!((used, ignored), (!pure, pure), "{printed}");
+        engine.assert_clean();
+    }
+}
+
+#[test]
 fn collision_surfaces_are_added_to_the_picture() {
     let mut engine = engine_in_map();
     let view = View::new(HERE, 0.0);
