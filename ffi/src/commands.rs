@@ -263,8 +263,8 @@ unsafe extern "C" fn report() {
         engine.say(&match zip {
             Some(Ok(bytes)) if engine.write_file(&path, &bytes) => {
                 format!(
-                    "Wrote {path} in the game's own folder: send this file with your question. Its text names nobody; its \
-                     picture shows what was on the screen\n"
+                    "Wrote {path} in the game's own folder: send this file with your question. It holds no user name or \
+                     address; its picture shows what was on the screen\n"
                 )
             }
             Some(Ok(_)) => format!("{path} could not be written\n"),

@@ -118,8 +118,10 @@ pub unsafe extern "C" fn load_world(name: *const c_char) {
             }
             renderer.load_world(&name).map_err(Failure::from)
         })?;
-        if let Some(line) = engine::current().and_then(|engine| unread_lights(engine, &name)) {
-            engine::current().inspect(|engine| engine.say(&line));
+        if let Some(engine) = engine::current()
+            && let Some(line) = unread_lights(engine, &name)
+        {
+            engine.say(&line);
         }
         Ok(())
     });
@@ -131,7 +133,7 @@ fn unread_lights(engine: Engine, map: &str) -> Option<String> {
     let unread = engine.home_has(&lights) && engine.read_file(&valid_game_path(&lights)?).is_none();
     unread.then(|| {
         format!(
-            "{lights} is not used: a pure server reads packs only. Give \\sv_pure 0 before the map starts, or put the \
+            "{lights} is not used: this server reads packs only. Give \\sv_pure 0 before the map starts, or put the \
              file into a .pk3\n"
         )
     })

@@ -48,7 +48,7 @@ fn fits(values: usize, per_pixel: usize, width: u32, height: u32) -> ImageResult
 pub fn open_exr(radiance: &[[f32; 3]], width: u32, height: u32) -> ImageResult<Vec<u8>> {
     fits(radiance.len(), 1, width, height)?;
     let size = exr::math::Vec2(width as usize, height as usize);
-    let half = |value: f32| f16::from_f32(value.min(f16::MAX.to_f32()));
+    let half = |value: f32| f16::from_f32(value.clamp(0.0, f16::MAX.to_f32()));
     let channels = SpecificChannels::rgb(|at: exr::math::Vec2<usize>| {
         let [r, g, b] = radiance[at.1 * size.0 + at.0].map(half);
         (r, g, b)

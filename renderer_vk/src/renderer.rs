@@ -27,6 +27,7 @@ use crate::settings::{Anaglyph, HdrChoice, Settings};
 use crate::stereo::Eye;
 use crate::targets::FrameTargets;
 use crate::trace::TraceLook;
+use crate::trace::ahead::compile_ahead;
 use crate::trace::pass_set::PassSet;
 use crate::trace::tracer::Tracer;
 use crate::world::{EntityTokens, Marker, World, WorldOptions};
@@ -425,16 +426,22 @@ impl Renderer {
 
     /// Makes the traced look at its first use; `false` without a map.
     fn ready_to_trace(&mut self) -> Result<bool, Error> {
-        if let (Some(world), Some(assets)) = (&mut self.world, &mut self.assets)
-            && (world.light_by(self.settings.rt_lights, assets, self.calibrations.as_ref())
-                || self.trace.is_none())
-        {
-            let tracer = Tracer::of(self.device.info(), self.settings.rt_tracer);
-            let kept = self.trace_passes.take().filter(|p| p.tracer() == tracer);
-            let new = || Arc::new(PassSet::new(&self.device, tracer));
-            let passes = self.trace_passes.insert(kept.unwrap_or_else(new));
-            self.trace = Some(TraceLook::new(passes, world, assets)?);
-            give_back_freed_memory();
+        if let (Some(world), Some(assets)) = (&mut self.world, &mut self.assets) {
+            let settings = &self.settings;
+            let has_fog = !world.data.relit.bsp.fogs.is_empty();
+            let lit = world.light_by(settings.rt_lights, assets, self.calibrations.as_ref());
+            if lit || self.trace.is_none() {
+                let tracer = Tracer::of(self.device.info(), settings.rt_tracer);
+                let kept = self.trace_passes.take().filter(|p| p.tracer() == tracer);
+                let new = || Arc::new(PassSet::new(&self.device, tracer));
+                let passes = self.trace_passes.insert(kept.unwrap_or_else(new));
+                compile_ahead(passes, settings, has_fog)?;
+                self.trace = Some(TraceLook::new(passes, world, assets)?);
+                give_back_freed_memory();
+            } else if let Some(passes) = &self.trace_passes {
+                // the settings may have changed
+                compile_ahead(passes, settings, has_fog)?;
+            }
         }
         Ok(self.trace.is_some())
     }

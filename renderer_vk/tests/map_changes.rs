@@ -113,9 +113,6 @@ fn anonymous() -> u64 {
 /// Loads `count` maps one after the other, draws three frames of each, and returns what was held then; `None`, with a
 /// printed line, without a device.
 fn changes(settings: &Settings, count: usize) -> Option<Vec<Held>> {
-    // the memory of this process would count another test's renderer
-    static ALONE: Mutex<()> = Mutex::new(());
-    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     let options = RendererOptions {
         validation: true,

@@ -258,7 +258,7 @@ impl Viewer {
                     });
                 ui.label("Light that reaches this place:");
                 if !self.found {
-                    ui.weak("Its lamps are not found yet: choose Traced, then click again.");
+                    ui.weak("The map's lights are not found yet: choose Traced, then click again.");
                 }
                 egui::Grid::new("arriving").striped(true).show(ui, |ui| {
                     for line in &picked.light {

@@ -214,11 +214,11 @@ impl Spot {
     pub fn part(&self, offset: Vec3) -> f32 {
         let along = -offset.dot(self.direction);
         let aside = (offset.length_squared() - along * along).max(0.0).sqrt();
-        match along > 0.0 {
-            // the compiler fades a cone out over the last 32 units of its radius
-            true => ((along * self.tan_half_angle - aside) / 32.0).clamp(0.0, 1.0),
-            false => 0.0,
+        if along <= 0.0 {
+            return 0.0;
         }
+        // the compiler fades a cone out over the last 32 units of its radius
+        ((along * self.tan_half_angle - aside) / 32.0).clamp(0.0, 1.0)
     }
 }
 

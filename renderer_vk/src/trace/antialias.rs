@@ -33,8 +33,7 @@ impl Method {
     fn of(settings: &Settings, output: [u32; 2]) -> Self {
         if settings.rt_accumulate {
             Self::Plain
-        } else if settings.rt_taa || settings.multisample > 1 {
-            // multisampling is replaced by one jittered sample per frame
+        } else if is_temporal(settings) {
             Self::Temporal
         } else if traced_size(settings, output) != output {
             Self::Upscale
@@ -42,6 +41,12 @@ impl Method {
             Self::Plain
         }
     }
+}
+
+/// Whether frames with these settings are antialiased over time. Multisampling is replaced by one jittered sample per
+/// frame.
+pub fn is_temporal(settings: &Settings) -> bool {
+    !settings.rt_accumulate && (settings.rt_taa || settings.multisample > 1)
 }
 
 /// Traced size for a picture of the size `output`, pixels. Reference pictures are traced in full size.

@@ -19,7 +19,7 @@ use super::frame_passes::FramePasses;
 use super::passes::Pass;
 use super::targets::texels;
 use crate::gpu::{Buffer, Device, Error, Format, Image, ImageDesc, ImageUsage};
-use crate::settings::DenoiserChoice;
+use crate::settings::{DenoiserChoice, Settings};
 
 /// Edge of a stratum, pixels; see `denoise.glsl`.
 const STRATUM: u32 = 3;
@@ -27,6 +27,14 @@ const STRATUM: u32 = 3;
 const WAVELET: [u32; 3] = [1, 3, 8];
 /// Radii of the passes of the sparse filter, pixels.
 const SPARSE: [u32; 3] = [3, 9, 5];
+
+/// The filter of frames with these settings. Reference pictures are not filtered.
+pub fn in_use(settings: &Settings) -> DenoiserChoice {
+    match settings.rt_accumulate {
+        true => DenoiserChoice::None,
+        false => settings.rt_denoiser,
+    }
+}
 
 /// The filter in use.
 #[derive(Clone, Copy, PartialEq, Eq)]

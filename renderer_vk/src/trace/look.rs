@@ -174,12 +174,11 @@ pub struct TraceLook {
 }
 
 impl TraceLook {
-    /// Compiles missing passes, and builds the map's acceleration structures and light lists.
+    /// Builds the map's acceleration structures and light lists.
     ///
     /// # Errors
     /// The device is out of memory or lost.
     pub fn new(passes: &Arc<PassSet>, world: &World, assets: &Assets) -> Result<Self, Error> {
-        passes.compile_ahead(!world.data.relit.bsp.fogs.is_empty())?;
         let (device, tracer) = (passes.device(), passes.tracer());
         let mut view_tracer = ViewTracer::new(passes)?;
         let exposure = world.data.relit.display_exposure();

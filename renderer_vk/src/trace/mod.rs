@@ -9,6 +9,7 @@
 #![forbid(unsafe_code)]
 
 pub mod accel;
+pub mod ahead;
 pub mod antialias;
 pub mod beyond_sky;
 pub mod bloom;

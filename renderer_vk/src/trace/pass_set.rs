@@ -1,9 +1,8 @@
 //! The compiled pipelines of the traced look's passes, one set per device and tracer, shared by all maps and views.
 
 use std::sync::OnceLock;
-use std::time::Instant;
 
-use super::passes::{Pass, Shader, Switch, TABLE};
+use super::passes::{Pass, Shader, TABLE};
 use super::tracer::Tracer;
 use crate::at_once::{Late, Make, make_all};
 use crate::gpu::{ComputePipeline, Device, Error, HitGroup, RayTracingDesc, RayTracingPipeline};
@@ -22,39 +21,6 @@ pub struct PassSet {
     tracer: Tracer,
     pipelines: Vec<[OnceLock<Pipeline>; 2]>,
 }
-
-/// Passes of denoised pictures with one bounce, in descending order of compile time.
-const AHEAD: [Pass; 27] = [
-    Pass::Primary,
-    Pass::OtherSide,
-    Pass::BounceShade,
-    Pass::Temporal,
-    Pass::PrimarySimple,
-    Pass::SampledDirect,
-    Pass::Suns,
-    Pass::BounceLight,
-    Pass::BounceRays,
-    Pass::PrimaryRays,
-    Pass::SampleLights,
-    Pass::WaveletFirst,
-    Pass::WaveletSecond,
-    Pass::WaveletLast,
-    Pass::Antialias,
-    Pass::Composite,
-    Pass::Gradient,
-    Pass::GradientReproject,
-    Pass::GradientSample,
-    Pass::GradientWide,
-    Pass::Histogram,
-    Pass::Exposure,
-    Pass::BounceUpsample,
-    Pass::ToneMap,
-    Pass::SparseTemporal,
-    Pass::SparseFirst,
-    Pass::SparseLast,
-];
-/// Passes that only maps with fog run.
-const FOG_AHEAD: [Pass; 2] = [Pass::FogLight, Pass::FogFilter];
 
 impl PassSet {
     /// An empty set.
@@ -123,39 +89,34 @@ impl PassSet {
         }
     }
 
-    /// Compiles missing pipelines of denoised pictures with one bounce, on all cores at once. `has_fog`: the map has
-    /// fog; if this is unknown, fog passes are compiled when fog comes into view.
+    /// Compiles those of these pipelines that are missing, on all cores at once. Takes no memory if none is.
     ///
     /// # Errors
     /// The driver refuses a pipeline.
-    pub fn compile_ahead(&self, has_fog: bool) -> Result<(), Error> {
-        let fog: &[Pass] = if has_fog { &FOG_AHEAD } else { &[] };
-        let variants = AHEAD.iter().chain(fog).flat_map(|&pass| {
-            let states: &[bool] = match pass.row().switch {
-                None => &[false],
-                Some((_, Switch::MapFog)) if has_fog => &[true],
-                Some((_, Switch::LitFog | Switch::MapFog)) if !has_fog => &[false],
-                Some(_) => &[true, false],
-            };
-            states.iter().map(move |&on| (pass, on))
-        });
+    pub fn compile_missing(
+        &self,
+        variants: impl Iterator<Item = (Pass, bool)>,
+    ) -> Result<(), Error> {
+        let is_missing = |&(pass, on): &(Pass, bool)| {
+            let place = &self.pipelines[pass as usize][usize::from(on)];
+            place.get().is_none()
+        };
         let jobs: Vec<_> = variants
+            .filter(is_missing)
             .map(|(pass, on)| Late::new(move || self.get(pass, on).map(|_| ())))
             .collect();
-        let begin = Instant::now();
+        if jobs.is_empty() {
+            return Ok(());
+        }
         if self.device.info().software {
+            // Mesa compiles in the first frame that runs a shader, and not here
             log::info!(
-                "preparing {} shaders of the traced look: minutes the first time, for a driver that draws on the processor",
+                "the first traced picture can take minutes with this driver, which compiles {} shaders for it and keeps them; \
+                 nothing moves meanwhile",
                 jobs.len()
             );
         }
         make_all(&jobs.iter().map(|job| job as &dyn Make).collect::<Vec<_>>());
-        let seconds = begin.elapsed().as_secs_f32();
-        if seconds > 2.0 {
-            log::info!(
-                "prepared the shaders of the traced look in {seconds:.0} s; the driver keeps them"
-            );
-        }
         jobs.into_iter().try_for_each(Late::take)
     }
 }

@@ -12,7 +12,7 @@ use super::accel::Accel;
 use super::antialias::{Antialias, traced_size};
 use super::bloom::Bloom;
 use super::counters::RayCounters;
-use super::denoise::Denoiser;
+use super::denoise::{self, Denoiser};
 use super::fog::LitFog;
 use super::frame_passes::{FrameFacts, FramePasses};
 use super::geometry::StaticGeometry;
@@ -26,7 +26,7 @@ use super::targets::Targets;
 use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
 use crate::scene::TracedScene;
-use crate::settings::{DebugOutput, DenoiserChoice, Settings};
+use crate::settings::{DebugOutput, DenoiserChoice, LightSelection, Settings};
 use crate::world::outside;
 use content::content_hash;
 use parameters::{Prepared, camera_frame, portal_record};
@@ -236,11 +236,7 @@ impl ViewTracer {
         } = *view;
         let size = [targets.width, targets.height];
         let goes_on = self.history.is_some();
-        let denoiser = if settings.rt_accumulate {
-            DenoiserChoice::None
-        } else {
-            settings.rt_denoiser
-        };
+        let denoiser = denoise::in_use(settings);
         self.denoiser.prepare(denoiser, size, goes_on)?;
         let has_fog = map.is_some_and(|m| fog_in_sight(&m, scene));
         self.fog.prepare(
@@ -392,7 +388,7 @@ fn light_directly(
     settings: &Settings,
     params: &TraceView,
 ) -> Result<(), Error> {
-    if !is_lit(settings) || !samples_one_light(params) {
+    if !samples_one_light(settings) {
         return passes.run(Pass::Direct);
     }
     passes.run(Pass::SampleLights)?;
@@ -404,8 +400,10 @@ fn light_directly(
 }
 
 /// Whether each pixel samples a single light, in a pass of its own.
-fn samples_one_light(params: &TraceView) -> bool {
-    params.lights.selection == t::SELECT_RESAMPLED && params.lights.samples == 1
+pub fn samples_one_light(settings: &Settings) -> bool {
+    is_lit(settings)
+        && settings.rt_light_selection == LightSelection::Resampled
+        && settings.rt_num_random_dl == 1
 }
 
 /// Clears bounced light, unless it is black.

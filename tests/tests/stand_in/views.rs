@@ -407,7 +407,7 @@ fn a_file_of_lights_is_named_when_it_is_used_and_when_it_is_not() {
         engine.picture(&View::new(HERE, 30.0)).unwrap();
         let printed = text_of(&engine.take_messages());
         let used = printed.contains("lights as in maps/rooms.lights");
-        let ignored = printed.contains("maps/rooms.lights is not used: a pure server");
+        let ignored = printed.contains("maps/rooms.lights is not used: this server");
         assert_eq!((used, ignored), (!pure, pure), "{printed}");
         engine.assert_clean();
     }

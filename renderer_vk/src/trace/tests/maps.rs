@@ -17,6 +17,7 @@ use crate::raster::FlareTest;
 use crate::scene::{GatherInput, Scene};
 use crate::settings::{Settings, TracerChoice};
 use crate::test_support::openarena;
+use crate::trace::ahead::compile_ahead;
 use crate::trace::pass_set::PassSet;
 use crate::trace::tracer::Tracer;
 use crate::trace::{MapView, TraceLook};
@@ -93,7 +94,10 @@ impl Game {
         frames: u32,
     ) -> (Vec<u8>, TraceLook) {
         let device = &self.gpu.device;
+        let has_fog = !world.data.relit.bsp.fogs.is_empty();
+        compile_ahead(passes, settings, has_fog).expect("pipelines");
         let mut look = TraceLook::new(passes, world, assets).expect("structures");
+        let ahead = device.compiled_pipelines();
         assets
             .materials
             .upload(device, &assets.samplers)
@@ -127,6 +131,8 @@ impl Game {
             self.gpu.ring.end(rec).expect("submitted");
         }
         device.wait_idle().expect("done");
+        let compiled = device.compiled_pipelines();
+        assert_eq!(compiled, ahead, "passes that a frame compiled");
         (device.read_image(&target).expect("read"), look)
     }
 }

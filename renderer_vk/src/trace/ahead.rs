@@ -1,0 +1,128 @@
+//! Which passes are compiled before a frame runs them, so that their pipelines are compiled at once and not one by one.
+
+use super::pass_set::PassSet;
+use super::passes::{Pass, Switch};
+use super::view_tracer::samples_one_light;
+use super::{antialias, denoise, indirect};
+use crate::gpu::Error;
+use crate::settings::{DenoiserChoice, Settings};
+
+/// Passes that the settings decide about, or that every frame runs, the slowest to compile first. Others are
+/// compiled when a frame first runs them.
+const AHEAD: [Pass; 32] = [
+    Pass::Primary,
+    Pass::Indirect,
+    Pass::OtherSide,
+    Pass::BounceShade,
+    Pass::Temporal,
+    Pass::PrimarySimple,
+    Pass::SampledDirect,
+    Pass::Direct,
+    Pass::Suns,
+    Pass::BounceLight,
+    Pass::BounceRays,
+    Pass::PrimaryRays,
+    Pass::SampleLights,
+    Pass::WaveletFirst,
+    Pass::WaveletSecond,
+    Pass::WaveletLast,
+    Pass::Antialias,
+    Pass::Composite,
+    Pass::Gradient,
+    Pass::GradientReproject,
+    Pass::GradientSample,
+    Pass::GradientWide,
+    Pass::Histogram,
+    Pass::Exposure,
+    Pass::BounceUpsample,
+    Pass::ToneMap,
+    Pass::SparseTemporal,
+    Pass::SparseFirst,
+    Pass::SparseSecond,
+    Pass::SparseLast,
+    Pass::BloomDown,
+    Pass::BloomUp,
+];
+/// Passes that only maps with fog run.
+const FOG_AHEAD: [Pass; 2] = [Pass::FogLight, Pass::FogFilter];
+
+/// Whether frames with these settings run a pass of [`AHEAD`].
+fn is_chosen(pass: Pass, settings: &Settings) -> bool {
+    match pass {
+        Pass::OtherSide => !settings.rt_accumulate,
+        Pass::SampleLights | Pass::SampledDirect | Pass::Suns => samples_one_light(settings),
+        Pass::Direct => !samples_one_light(settings),
+        Pass::BounceRays | Pass::BounceShade | Pass::BounceLight => indirect::is_split(settings),
+        Pass::BounceUpsample => indirect::is_subsampled(settings),
+        Pass::Indirect => settings.rt_bounces > 0 && !indirect::is_split(settings),
+        Pass::Temporal
+        | Pass::WaveletFirst
+        | Pass::WaveletSecond
+        | Pass::WaveletLast
+        | Pass::Gradient
+        | Pass::GradientReproject
+        | Pass::GradientSample
+        | Pass::GradientWide => denoise::in_use(settings) == DenoiserChoice::ASvgf,
+        Pass::SparseTemporal | Pass::SparseFirst | Pass::SparseSecond | Pass::SparseLast => {
+            denoise::in_use(settings) == DenoiserChoice::Sparse
+        }
+        Pass::BloomDown | Pass::BloomUp => settings.rt_bloom > 0.0,
+        Pass::Antialias => antialias::is_temporal(settings),
+        _ => true,
+    }
+}
+
+/// Compiles what frames with these settings run and `passes` lacks. `has_fog`: the map has fog.
+///
+/// # Errors
+/// The driver refuses a pipeline.
+pub fn compile_ahead(passes: &PassSet, settings: &Settings, has_fog: bool) -> Result<(), Error> {
+    let fog: &[Pass] = if has_fog { &FOG_AHEAD } else { &[] };
+    let chosen = AHEAD.iter().filter(|&&pass| is_chosen(pass, settings));
+    passes.compile_missing(chosen.chain(fog).flat_map(|&pass| {
+        let states: &[bool] = match pass.row().switch {
+            None => &[false],
+            Some((_, Switch::Bounces)) if settings.rt_bounces > 0 => &[true],
+            Some((_, Switch::MapFog)) if has_fog => &[true],
+            Some((_, Switch::LitFog)) if has_fog => &[true, false],
+            Some(_) => &[false],
+        };
+        states.iter().map(move |&on| (pass, on))
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::PRESETS;
+
+    /// Whether frames of a preset run each of these passes.
+    fn of_preset<const N: usize>(name: &str, passes: [Pass; N]) -> [bool; N] {
+        let preset = PRESETS.iter().find(|preset| preset.name == name);
+        let mut settings = Settings::full_size();
+        preset
+            .expect("a preset")
+            .put(&mut settings)
+            .expect("its values");
+        passes.map(|pass| AHEAD.contains(&pass) && is_chosen(pass, &settings))
+    }
+
+    #[test]
+    fn presets_have_the_passes_of_their_bounces_and_filters() {
+        use Pass::{Antialias, BounceShade, Direct, Indirect, SparseLast, Temporal};
+        let passes = [
+            BounceShade,
+            Indirect,
+            Temporal,
+            SparseLast,
+            Antialias,
+            Direct,
+        ];
+        let low = of_preset("low", passes);
+        assert_eq!(low, [false, false, true, false, true, false]);
+        let high = of_preset("high", passes);
+        assert_eq!(high, [true, false, true, false, true, false]);
+        let reference = of_preset("reference", passes);
+        assert_eq!(reference, [false, true, false, false, false, true]);
+    }
+}
