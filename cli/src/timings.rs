@@ -1,12 +1,12 @@
 //! Cost of frames: `relight render --timings`.
 
-use renderer_vk::FrameStats;
+use renderer_vk::{Costs, FrameStats};
 use serde_json::{Map, Value, json};
 
 /// Times of many frames, milliseconds.
 #[derive(Default)]
 pub struct Timings {
-    /// Name, sum and number of each GPU pass, in order of recording.
+    /// Name, sum and number of frames of each GPU pass, in order of recording.
     passes: Vec<(String, f32, u32)>,
     gpu: Vec<f32>,
     cpu: Vec<f32>,
@@ -19,10 +19,10 @@ pub struct Timings {
 impl Timings {
     /// Adds a frame: the passes of the newest frame that the GPU finished, and the CPU time of this one.
     pub fn add(&mut self, passes: &[(String, f32)], stats: &FrameStats) {
-        for (name, ms) in passes {
-            match self.passes.iter_mut().find(|(n, ..)| n == name) {
-                Some((_, sum, count)) => (*sum, *count) = (*sum + ms, *count + 1),
-                None => self.passes.push((name.clone(), *ms, 1)),
+        for pass in Costs::passes(passes, |_| None) {
+            match self.passes.iter_mut().find(|(n, ..)| *n == pass.name) {
+                Some((_, sum, count)) => (*sum, *count) = (*sum + pass.ms, *count + 1),
+                None => self.passes.push((pass.name, pass.ms, 1)),
             }
         }
         if !passes.is_empty() {
@@ -37,7 +37,7 @@ impl Timings {
         self.draws = self.draws.max(stats.draws);
     }
 
-    /// `ms`: mean of each pass; `gpu_ms` and `cpu_ms`: median and maximum of the frames' sums, for the CPU with the
+    /// `ms`: mean of each pass over the frames that run it; `gpu_ms` and `cpu_ms`: median and maximum of the frames' sums, for the CPU with the
     /// medians of its parts; `draws`: largest number of draw calls in a frame.
     pub fn report(&self) -> Map<String, Value> {
         let passes: Map<_, _> = self
@@ -85,10 +85,12 @@ mod tests {
             let mut stats = FrameStats::default();
             stats.cpu.record = ms;
             stats.cpu.wait = 100.0;
-            timings.add(&[("a".into(), ms), ("b".into(), 1.0)], &stats);
+            let passes = [("a".into(), ms), ("b".into(), 0.5), ("b".into(), 0.5)];
+            timings.add(&passes, &stats);
         }
         let report = Value::Object(timings.report());
         assert_eq!(report["ms"]["a"], json!(4.0));
+        assert_eq!(report["ms"]["b"], json!(1.0), "runs of one frame add up");
         assert_eq!(report["gpu_ms"]["median"], json!(3.0));
         assert_eq!(report["cpu_ms"]["worst"], json!(9.0));
         assert_eq!(report["cpu_ms"]["median"], json!(2.0));

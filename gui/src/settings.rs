@@ -30,7 +30,7 @@ pub const MAIN: [(&str, &str, &[&str]); 10] = [
         "Light candidates",
         &["trace_sample_lights"],
     ),
-    ("rt_bounces", "Bounces", &["trace_bounce", "trace_indirect"]),
+    ("rt_bounces", "Bounces", &["trace_bounce"]),
     ("rt_maxDepth", "Mirrors and panes", &["trace_other_side"]),
     (
         "rt_denoiser",
@@ -232,7 +232,7 @@ mod tests {
             ("trace_bounce_light".to_owned(), 0.25),
             ("trace_direct".to_owned(), 2.0),
         ];
-        assert_eq!(cost(&timings, &["trace_bounce", "trace_indirect"]), 0.75);
+        assert_eq!(cost(&timings, &["trace_bounce"]), 0.75);
         assert_eq!(cost(&timings, &[]), 0.0);
     }
 }

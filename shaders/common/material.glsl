@@ -24,6 +24,9 @@ struct StagePoint {
     float view_distance; // from the camera, for `alphaGen portal`
 };
 
+// Values of the engine's sine table of 1024 entries.
+vec2 table_sine(ivec2 index) { return sin(vec2(index & 1023) * (6.283185307 / 1023.0)); }
+
 // Value of a wave. `turns`: periods. The engine's tables have 1024 entries.
 float wave_table(uint function, float turns) {
     int index = int(turns * 1024.0) & 1023;
@@ -86,8 +89,7 @@ vec2 modified_texcoord(MaterialBuffers buffers, uint first, uint count, vec2 ent
         case TCMOD_TURBULENT: {
             Wave wave = mods.at[i].wave;
             float now = wave_turns(wave.phase, wave.frequency, p.time);
-            offset = vec2(wave_table(WAVE_SIN, (p.position.x + p.position.z) * (1.0 / 1024.0) + now),
-                          wave_table(WAVE_SIN, p.position.y * (1.0 / 1024.0) + now)) * wave.amplitude;
+            offset = table_sine(ivec2((vec2(p.position.x + p.position.z, p.position.y) * (1.0 / 1024.0) + now) * 1024.0)) * wave.amplitude;
             break;
         }
         case TCMOD_SCALE: m = mat2(mods.at[i].values[0], 0.0, 0.0, mods.at[i].values[1]); break;
@@ -106,8 +108,8 @@ vec2 modified_texcoord(MaterialBuffers buffers, uint first, uint count, vec2 ent
             // the engine reads the angle from its sine table of 1024 entries
             float turns = -mods.at[i].values[0] * p.time / 360.0;
             int index = int(fract(turns) * 1024.0);
-            float s = sin(float(index & 1023) * (6.283185307 / 1023.0));
-            float c = sin(float((index + 256) & 1023) * (6.283185307 / 1023.0));
+            vec2 sine = table_sine(ivec2(index, index + 256));
+            float s = sine.x, c = sine.y;
             m = mat2(c, s, -s, c);
             offset = vec2(0.5 - 0.5 * c + 0.5 * s, 0.5 - 0.5 * s - 0.5 * c);
             break;

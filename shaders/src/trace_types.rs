@@ -19,7 +19,7 @@ pub use lights::{
     BspNode, DynamicRow, LightBounds, LightRow, LightSlot, LightView, SphereLight, SunLight,
     TriangleLight,
 };
-pub use structures::{BvhInstance, BvhNode, BvhTriangle, FilterStep, GeometryRecord};
+pub use structures::{BvhInstance, BvhNode, BvhTriangle, FilterStep, GeometryRecord, PassStep};
 pub use surroundings::{FlareView, FogView, PortalRecord, SkyRecord, TransportView};
 pub use view::{CameraView, ExposureView, ImageView, PostView, SceneView, TargetView};
 

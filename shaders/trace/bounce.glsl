@@ -35,9 +35,12 @@ PathVertex first_vertex(LightTask task) {
     return PathVertex(task.surface.position, task.surface.face_normal, task.surface.normal);
 }
 
-// Starts the random numbers of a pixel's bounced light; returns one for rounding.
-float bounce_random(LightTask task) {
-    rng_begin(uvec2(task.pixel), subsample_index(task.seed), STREAM_BOUNCE);
+// Passes of a bounce: its rays, the surfaces that they meet, the rays to lights.
+const uint BOUNCE_RAYS = 0, BOUNCE_HITS = 1, BOUNCE_LIGHT = 2;
+
+// Starts the random numbers of one of these passes for a pixel; returns one for rounding.
+float bounce_random(LightTask task, uint bounce, uint pass) {
+    rng_begin(uvec2(task.pixel), subsample_index(task.seed), STREAM_BOUNCE + STREAMS * (3 * bounce + pass));
     return rng_independent();
 }
 
@@ -63,8 +66,9 @@ bool shows_face(SurfacePoint p, vec3 direction) {
 }
 
 // Shades the hit of a bounce ray: adds emission to `sum` and moves the vertex to the hit. False: the path ends.
-bool bounce_shade(Hit hit, vec3 origin, vec3 direction, inout vec3 throughput, inout vec3 sum, out PathVertex v) {
+bool bounce_shade(Hit hit, vec3 origin, inout vec3 throughput, inout vec3 sum, out PathVertex v) {
     SurfacePoint p = surface_point(hit);
+    vec3 direction = safe_normalize(p.position - origin, -p.face_normal);
     float t = dot(p.position - origin, direction);
     if (HAS_FOG != 0) {
         // displayed colour, exposed as the engine shows it, as for primary rays

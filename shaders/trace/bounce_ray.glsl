@@ -1,5 +1,5 @@
-// Data that the passes of a single bounce exchange: 64 bytes for each cell of 2 x 2 pixels, which are the scratch texels
-// of its four pixels. One pixel of a cell gathers bounced light.
+// Data that the passes of a bounce exchange: 64 bytes for each cell of 2 x 2 pixels, which are the scratch texels of its
+// four pixels. One pixel of a cell gathers bounced light at a time.
 #ifndef RELIGHT_TRACE_BOUNCE_RAY_GLSL
 #define RELIGHT_TRACE_BOUNCE_RAY_GLSL
 
@@ -7,6 +7,14 @@
 #include "trace/light_ray.glsl"
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer BounceTexels { uvec4 at[]; };
+
+// The pixel of a cell that this run gathers for: the frame's own, or each of the four in turns. May be off the picture.
+ivec2 bounce_pixel(ivec2 cell) {
+    if ((VIEW.flags & VIEW_SUBSAMPLED_BOUNCE) != 0) return subsample_pixel(cell);
+    return cell * CELL + ivec2(push.part & 1u, push.part >> 1u);
+}
+
+bool is_last_bounce() { return push.number + 1 >= VIEW.transport.bounces; }
 
 ivec2 bounce_cells() { return (ivec2(VIEW.width, VIEW.height) + CELL - 1) / CELL; }
 
@@ -16,20 +24,39 @@ uint bounce_place(ivec2 cell, uint part) {
     return uint(cells.x * cells.y) * part + uint(cell.y * cells.x + cell.x);
 }
 
-// Writes the hit of a bounce ray, and the colour by which filters on its way tint the light.
-void bounce_hit_write(ivec2 cell, Hit hit, vec3 color) {
+// Whether paths have a throughput other than 1 before the surface that a ray meets.
+bool has_throughput() { return VIEW.transport.filter_count != 0 || VIEW.transport.bounces > 1; }
+
+// Writes the hit of a bounce ray, and the throughput of the path before the hit surface.
+void bounce_hit_write(ivec2 cell, Hit hit, vec3 throughput) {
     BounceTexels texels = BounceTexels(VIEW.scratch);
     texels.at[bounce_place(cell, 0)] = uvec4(hit.geometry, hit.primitive, floatBitsToUint(hit.barycentrics));
-    if (VIEW.transport.filter_count != 0) texels.at[bounce_place(cell, 1)] = uvec4(floatBitsToUint(color), 0);
+    if (has_throughput()) texels.at[bounce_place(cell, 1)] = uvec4(floatBitsToUint(throughput), 0);
 }
 
 // The distance is not stored; it follows from the point on the triangle.
-Hit bounce_hit_read(ivec2 cell, out vec3 color) {
+Hit bounce_hit_read(ivec2 cell, out vec3 throughput) {
     BounceTexels texels = BounceTexels(VIEW.scratch);
     uvec4 hit = texels.at[bounce_place(cell, 0)];
-    color = vec3(1.0);
-    if (VIEW.transport.filter_count != 0) color = uintBitsToFloat(texels.at[bounce_place(cell, 1)].xyz);
+    throughput = vec3(1.0);
+    if (has_throughput()) throughput = uintBitsToFloat(texels.at[bounce_place(cell, 1)].xyz);
     return Hit(hit.x, hit.y, uintBitsToFloat(hit.zw), 0.0);
+}
+
+// Writes the normals of the vertex from which the next bounce starts, in place of the hit; its position is the origin of
+// the shadow ray. `throughput`: 0 if the path has ended.
+void bounce_vertex_write(ivec2 cell, PathVertex v, vec3 throughput) {
+    BounceTexels texels = BounceTexels(VIEW.scratch);
+    texels.at[bounce_place(cell, 0)] = uvec4(pack_normal(v.face_normal), pack_normal(v.normal), 0, 0);
+    texels.at[bounce_place(cell, 1)] = uvec4(floatBitsToUint(throughput), 0);
+}
+
+// The vertex, without its position.
+PathVertex bounce_vertex_read(ivec2 cell, out vec3 throughput) {
+    BounceTexels texels = BounceTexels(VIEW.scratch);
+    uvec2 normals = texels.at[bounce_place(cell, 0)].xy;
+    throughput = uintBitsToFloat(texels.at[bounce_place(cell, 1)].xyz);
+    return PathVertex(vec3(0.0), unpack_normal(normals.x), unpack_normal(normals.y));
 }
 
 // A shadow ray to a light, and the radiance found before it.
@@ -54,6 +81,18 @@ BounceLight bounce_light_read(ivec2 cell) {
     LightSample light = unpack_light_ray(texels.at[bounce_place(cell, 3)], spare, sky);
     light.sky = sky;
     return BounceLight(uintBitsToFloat(found.xyz), light, unpack_light(found.w));
+}
+
+// Origin of the last shadow ray, and the radiance found so far.
+vec3 bounce_origin_read(ivec2 cell, out vec3 found) {
+    uvec4 texel = BounceTexels(VIEW.scratch).at[bounce_place(cell, 2)];
+    found = unpack_light(texel.w);
+    return uintBitsToFloat(texel.xyz);
+}
+
+// Replaces the radiance found so far. `dither`: see `pack_light`.
+void bounce_found_write(ivec2 cell, vec3 found, float dither) {
+    BounceTexels(VIEW.scratch).at[bounce_place(cell, 2)].w = pack_light(finite_light(found), dither);
 }
 
 #endif

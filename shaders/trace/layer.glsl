@@ -62,10 +62,17 @@ Footprint ellipse_footprint(SurfacePoint p, vec3 direction, float cosine, float 
     return f;
 }
 
-// Mean of the image over an ellipse: lookups of the shorter axis's width, side by side along the longer axis, as
-// anisotropic samplers do, but equal with every driver. If the allowed number does not cover the ellipse, they cover a
-// part of it, so that the result is never less sharp than the round footprint.
-vec4 texel_in_ellipse(uint image, uint sampler_index, vec2 uv, vec2 along, vec2 across) {
+// The part of an image that is averaged: `count` lookups at `lod`, side by side along `axis`.
+struct Lookups {
+    vec2 axis;
+    float count;
+    float lod;
+};
+
+// Lookups that cover an ellipse: of the shorter axis's width, side by side along the longer axis, as anisotropic
+// samplers do, but equal with every driver. If the allowed number does not cover the ellipse, they cover a part of it,
+// so that the result is never less sharp than the round footprint.
+Lookups ellipse_lookups(uint image, vec2 along, vec2 across) {
     vec2 size = vec2(textureSize(textures[nonuniformEXT(image)], 0));
     float longer = length(along * size), shorter = length(across * size);
     vec2 axis = along;
@@ -80,14 +87,27 @@ vec4 texel_in_ellipse(uint image, uint sampler_index, vec2 uv, vec2 along, vec2 
     axis *= covered / max(longer, 1.0e-12);
     // a magnified image needs one lookup
     float count = clamp(ceil(covered / max(shorter, 1.0)), 1.0, floor(most));
-    float lod = max(log2(max(covered / count, 1.0e-6)), 0.0);
+    return Lookups(axis, count, max(log2(max(covered / count, 1.0e-6)), 0.0));
+}
+
+// Mean of the image over the lookups.
+vec4 texel_mean(uint image, uint sampler_index, vec2 uv, Lookups lookups) {
     vec4 sum = vec4(0.0);
-    for (float i = 0.5; i < count; i += 1.0)
-        sum += textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[nonuniformEXT(sampler_index)]), uv + axis * (i / count - 0.5), lod);
-    return sum / count;
+    for (float i = 0.5; i < lookups.count; i += 1.0)
+        sum += textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[nonuniformEXT(sampler_index)]),
+            uv + lookups.axis * (i / lookups.count - 0.5), lookups.lod);
+    return sum / lookups.count;
 }
 
 bool has_ellipse(Footprint f) { return VIEW.antialias.anisotropy > 1.0 && f.along != vec2(0.0); }
+
+// The image of a material that is one image under light, at the point.
+vec4 plain_texel(Material material, SurfacePoint p, Footprint footprint) {
+    Lookups lookups;
+    if (has_ellipse(footprint)) lookups = ellipse_lookups(material.plain_image, footprint.along, footprint.across);
+    else lookups = Lookups(vec2(0.0), 1.0, texture_lod(material.plain_image, p.texel_scale, footprint.width));
+    return texel_mean(material.plain_image, material.plain_sampler, p.stage.st, lookups);
+}
 
 // The stage's image at the point; white for a stage without an image.
 vec4 stage_texel(Stage stage, SurfacePoint p, Instance instance, Footprint footprint) {
@@ -95,14 +115,17 @@ vec4 stage_texel(Stage stage, SurfacePoint p, Instance instance, Footprint footp
     if ((stage.flags & STAGE_WHITE) != 0 || image == NO_TEXTURE) return vec4(1.0);
     mat2 jacobian;
     vec2 uv = stage_texcoord(VIEW.materials, stage, instance, p.stage, jacobian);
-    if (stage.tc_gen == TCGEN_BASE && has_ellipse(footprint))
-        return texel_in_ellipse(image, stage.sampler_index, uv, jacobian * footprint.along, jacobian * footprint.across);
-    float scale = p.texel_scale;
-    if (stage.tc_gen == TCGEN_ENVIRONMENT) scale = 0.0;
-    if (stage.tc_gen == TCGEN_VECTOR) scale = sqrt(length(stage.vector_s) * length(stage.vector_t));
-    scale *= sqrt(abs(determinant(jacobian)));
-    float lod = texture_lod(image, scale, footprint.width);
-    return textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[nonuniformEXT(stage.sampler_index)]), uv, lod);
+    Lookups lookups;
+    if (stage.tc_gen == TCGEN_BASE && has_ellipse(footprint)) {
+        lookups = ellipse_lookups(image, jacobian * footprint.along, jacobian * footprint.across);
+    } else {
+        float scale = p.texel_scale;
+        if (stage.tc_gen == TCGEN_ENVIRONMENT) scale = 0.0;
+        if (stage.tc_gen == TCGEN_VECTOR) scale = sqrt(length(stage.vector_s) * length(stage.vector_t));
+        scale *= sqrt(abs(determinant(jacobian)));
+        lookups = Lookups(vec2(0.0), 1.0, texture_lod(image, scale, footprint.width));
+    }
+    return texel_mean(image, stage.sampler_index, uv, lookups);
 }
 
 // Whether the point is solid: whether a stage that writes depth passes its alpha test.
@@ -157,23 +180,23 @@ Layer layer_scale(Layer a, float s) { return Layer(a.lit * s, a.emission * s, a.
 Layer layer_add(Layer a, Layer b) {
     return Layer(a.lit + b.lit, a.emission + b.emission, a.through + b.through, a.reflected + b.reflected, a.haze + b.haze);
 }
-Layer layer_subtract(Layer a, Layer b) {
-    return Layer(a.lit - b.lit, a.emission - b.emission, a.through - b.through, a.reflected - b.reflected, a.haze - b.haze);
-}
 
 // `value` times a blend factor. The frame buffer has no alpha: destination alpha reads as one.
 Layer layer_blend(uint factor, Layer value, Layer source, Layer destination, float source_alpha, vec3 light) {
+    // parts of the value itself, and of its product with the source or the destination
+    float kept = 0.0, multiplied = 0.0;
     switch (factor) {
-    case BLEND_ONE: return value;
-    case BLEND_DST_COLOR: return layer_product(value, destination, light);
-    case BLEND_ONE_MINUS_DST_COLOR: return layer_subtract(value, layer_product(value, destination, light));
-    case BLEND_SRC_COLOR: return layer_product(value, source, light);
-    case BLEND_ONE_MINUS_SRC_COLOR: return layer_subtract(value, layer_product(value, source, light));
-    case BLEND_SRC_ALPHA: return layer_scale(value, source_alpha);
-    case BLEND_ONE_MINUS_SRC_ALPHA: return layer_scale(value, 1.0 - source_alpha);
-    case BLEND_DST_ALPHA: return value;
-    default: return layer_nothing(); // ZERO, ONE_MINUS_DST_ALPHA, SRC_ALPHA_SATURATE
-    }
+    case BLEND_ONE: case BLEND_DST_ALPHA: kept = 1.0; break;
+    case BLEND_DST_COLOR: case BLEND_SRC_COLOR: multiplied = 1.0; break;
+    case BLEND_ONE_MINUS_DST_COLOR: case BLEND_ONE_MINUS_SRC_COLOR: kept = 1.0; multiplied = -1.0; break;
+    case BLEND_SRC_ALPHA: kept = source_alpha; break;
+    case BLEND_ONE_MINUS_SRC_ALPHA: kept = 1.0 - source_alpha; break;
+    } // ZERO, ONE_MINUS_DST_ALPHA, SRC_ALPHA_SATURATE: nothing
+    Layer r = layer_scale(value, kept);
+    if (multiplied == 0.0) return r;
+    bool by_source = factor == BLEND_SRC_COLOR || factor == BLEND_ONE_MINUS_SRC_COLOR;
+    if (!by_source) source = destination;
+    return layer_add(r, layer_scale(layer_product(value, source, light), multiplied));
 }
 
 // A displayed part in linear light. Most parts of most layers are zero.
@@ -200,14 +223,7 @@ Layer run_stages(Material material, SurfacePoint p, Footprint footprint, uint se
     bool world = (p.triangle.flags & TRIANGLE_WORLD) != 0;
     if (material.plain_image != NO_TEXTURE && (world || (material.flags & MATERIAL_VERTEX_LIGHT) == 0)) {
         // shortcut for the many materials that are one image under light; same result as the loop below
-        if (has_ellipse(footprint)) {
-            vec4 texel = texel_in_ellipse(material.plain_image, material.plain_sampler, p.stage.st, footprint.along, footprint.across);
-            return Layer(texel.rgb, vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
-        }
-        float lod = texture_lod(material.plain_image, p.texel_scale, footprint.width);
-        vec3 texel = textureLod(sampler2D(textures[nonuniformEXT(material.plain_image)],
-            samplers[nonuniformEXT(material.plain_sampler)]), p.stage.st, lod).rgb;
-        return Layer(texel, vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
+        return Layer(plain_texel(material, p, footprint).rgb, vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
     }
     Instance instance = instance_of(p.instance);
     Stages stages = Stages(VIEW.materials.stages);
@@ -218,6 +234,7 @@ Layer run_stages(Material material, SurfacePoint p, Footprint footprint, uint se
         if ((stage.flags & STAGE_LIGHT_STYLE) != 0) continue;
         vec4 color = stage_color(VIEW.materials, stage, instance, p.stage);
         Layer source = layer_nothing();
+        bool lights_haze = false;
         float alpha;
         bool lightmap = stage.image_count == 0 && (stage.flags & STAGE_WHITE) == 0;
         if (lightmap || (stage.flags & STAGE_BAKED_LIGHT) != 0) {
@@ -242,7 +259,8 @@ Layer run_stages(Material material, SurfacePoint p, Footprint footprint, uint se
             // the reflection brings its own light
             if (mirrors && seen == SEEN_FOLLOWED) source.reflected = mean.rgb * (is_lit ? vec3(1.0) : color.rgb);
             if (haze) {
-                source.haze = image * (is_lit ? displayed_light(p) : color.rgb);
+                source.haze = is_lit ? image : image * color.rgb;
+                lights_haze = is_lit;
             } else if (mirrors && !gloss) {
                 if (seen == SEEN_LAST) source.emission = image * color.rgb;
             } else if (is_lit) {
@@ -260,7 +278,9 @@ Layer run_stages(Material material, SurfacePoint p, Footprint footprint, uint se
             }
         }
         if (stage.alpha_func != ALPHAFUNC_NONE && !alpha_passes(stage.alpha_func, alpha)) continue;
-        vec3 light = source.lit != vec3(0.0) && (layer.through != vec3(0.0) || layer.haze != vec3(0.0)) ? displayed_light(p) : vec3(1.0);
+        bool lights_background = source.lit != vec3(0.0) && (layer.through != vec3(0.0) || layer.haze != vec3(0.0));
+        vec3 light = lights_haze || lights_background ? displayed_light(p) : vec3(1.0);
+        if (lights_haze) source.haze *= light;
         layer = layer_add(layer_blend(stage.blend_src, source, source, layer, alpha, light),
             layer_blend(stage.blend_dst, layer, source, layer, alpha, light));
     }

@@ -7,6 +7,7 @@
 #include "trace/candidate.glsl"
 
 bool rays_needed = false;
+const bool HAS_RAYS = false;
 
 // Placed before code that traces rays: without a tracer the function returns `answer` here.
 #define NEEDS_RAYS(answer) { rays_needed = true; return answer; }

@@ -76,7 +76,8 @@ LastSpace last_space(Path path, vec3 position, float t) {
     return LastSpace(path.last.linear, VIEW.camera.origin + path.view_direction * (path.travelled + t) - path.last.linear * position);
 }
 
-void keep_lit(SurfacePoint p, vec3 lit, Path path, float t) {
+// `last`: the point's position in the last frame.
+void keep_lit(SurfacePoint p, vec3 lit, Path path, LastPlace last, float t) {
     float weight = max_component(lit);
     if (!(weight > 0.0)) return;
     if (abs(dot(lit_plane.xyz, p.face_normal)) > 0.99 && abs(dot(lit_plane.xyz, p.position) - lit_plane.w) < PAINT_DISTANCE) {
@@ -97,12 +98,12 @@ void keep_lit(SurfacePoint p, vec3 lit, Path path, float t) {
     kept.normal = dot(p.normal, kept.face_normal) < 0.0 ? -p.normal : p.normal;
     kept.albedo = lit;
     kept.first_person = (instance_of(p.instance).flags & INSTANCE_FIRST_PERSON) != 0;
-    kept_last = last_place(last_space(path, p.position, t), p, path.travelled + t);
+    kept_last = last;
     kept_bent = path.bent;
 }
 
 // Records emission in front of the surface that sets the pixel's motion. Only temporal antialiasing reads it.
-void record_glow(Path path, SurfacePoint p, vec3 emission, float t) {
+void record_glow(Path path, vec3 emission, LastPlace last) {
     if (VIEW.antialias.history == 0 || emission == vec3(0.0)) return;
     vec3 glow = path.cover * encode_display(path.transmittance * emission);
     float brightest = max_component(glow);
@@ -111,7 +112,7 @@ void record_glow(Path path, SurfacePoint p, vec3 emission, float t) {
     if (brightest <= brightest_glow) return;
     brightest_glow = brightest;
     CameraRay ray = CameraRay(path.origin, path.direction, path.view_direction, vec2(LAUNCH_PIXEL) + vec2(0.5) + VIEW.antialias.jitter);
-    glow_motion = motion_of(ray, last_place(last_space(path, p.position, t), p, path.travelled + t)).xyz;
+    glow_motion = motion_of(ray, last).xyz;
 }
 
 // Part of the pixel's light, relative to its emission (`front`), that is due to layers which move differently from the
@@ -181,22 +182,23 @@ vec3 light_shown(SurfacePoint p) {
     return decode_display(displayed_light(p));
 }
 
-void add_layer(inout Path path, SurfacePoint p, SeenLayer layer, float t) {
+void add_layer(inout Path path, SurfacePoint p, SeenLayer layer, LastPlace last, float t) {
     vec3 lit = path.transmittance * layer.linear.lit, own = path.transmittance * layer.own;
     vec3 glow = path.transmittance * layer.linear.emission;
     bool glows = glow != vec3(0.0), is_lit = lit != vec3(0.0);
     bool alone = path.cover == vec3(1.0) && path.shown == vec3(0.0) && layer.cover == vec3(0.0) && !(glows && is_lit);
+    vec3 gain = vec3(1.0);
     if (alone) {
         path.radiance += path.weight * (glow + own);
-        keep_lit(p, path.weight * lit, path, t);
     } else {
         if (glows) path.glow += path.weight * glow * share_display(path, encode_display(glow));
         if (is_lit) {
             vec3 share = share_display(path, encode_display(lit * light_shown(p) + own));
             path.glow += path.weight * own * share;
-            keep_lit(p, path.weight * lit * min(share, path.cover * MOST_GAIN / display_slope(path.shown)), path, t);
+            gain = min(share, path.cover * MOST_GAIN / display_slope(path.shown));
         }
     }
+    keep_lit(p, path.weight * lit * gain, path, last, t);
     path.cover *= layer.cover;
     path.events++;
 }

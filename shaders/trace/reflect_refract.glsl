@@ -69,8 +69,8 @@ void reflect_path(inout Path path, SurfacePoint p, float t, vec3 face, vec3 norm
     path.layer_mask = MASK_TRANSLUCENT | MASK_THIRD_TRANSLUCENT;
 }
 
-// 1: the pass that follows each split path to the other field's surface.
-layout(constant_id = 2) const uint OTHER_FIELD = 0;
+// Whether this run follows each split path to the other field's surface.
+bool follows_other_side() { return push.number != 0; }
 
 // Whether the path follows the reflection; `weight`: factor of the followed side. At the first such surface pixels
 // alternate like a checkerboard, fixed over frames, and `composite` joins both fields; in reference mode a pixel
@@ -83,7 +83,7 @@ bool follows_reflection(inout Path path, float reflected, float rest, out float 
     if (path.field == 0) {
         bool accumulates = (VIEW.flags & VIEW_ACCUMULATE) != 0;
         uint parity = uint(LAUNCH_PIXEL.x) + uint(LAUNCH_PIXEL.y) + (accumulates ? VIEW.seed : 0u);
-        path.field = 1u + ((parity + OTHER_FIELD) & 1u);
+        path.field = 1u + ((parity + push.number) & 1u);
         weight = 2.0;
         return path.field == 2;
     }
@@ -110,46 +110,60 @@ bool pass_reflection(inout Path path, SurfacePoint p, Layer layer, float t) {
     return false;
 }
 
-// Handles the surface of glass or a liquid; true if the path is mirrored or refracted. Glass in maps is panes: the
-// second face, usually culled, reverses the refraction of the first, so rays pass straight.
-bool pass_dielectric(inout Path path, SurfacePoint p, Material material, SeenLayer seen, float width, float t) {
-    Layer layer = seen.linear;
+// The surface of glass or a liquid at a point of a path. `face`, `normal`: as for `reflect_path`; `eta`: ratio of the
+// indices of refraction; `bend`: BENT_*.
+struct Interface {
+    vec3 face;
+    vec3 normal;
+    float eta;
+    float mirrored; // share of the light that is reflected
+    uint bend;
+    bool liquid;
+    bool enters;
+};
+
+// Glass in maps is panes: the second face, usually culled, reverses the refraction of the first, so rays pass straight.
+Interface interface_at(Path path, SurfacePoint p, Material material, float width) {
     Dielectric dielectric = material.dielectric;
-    bool liquid = (material.flags & MATERIAL_LIQUID) != 0;
-    bool enters = dot(p.face_normal, path.direction) < 0.0;
-    vec3 face = enters ? p.face_normal : -p.face_normal;
-    vec3 normal = ripple_normal(face, p.position, dielectric.ripple, width, p.stage.time);
-    float cosine = -dot(normal, path.direction);
+    Interface i;
+    i.liquid = (material.flags & MATERIAL_LIQUID) != 0;
+    i.enters = dot(p.face_normal, path.direction) < 0.0;
+    i.face = i.enters ? p.face_normal : -p.face_normal;
+    i.normal = ripple_normal(i.face, p.position, dielectric.ripple, width, p.stage.time);
+    float cosine = -dot(i.normal, path.direction);
     if (cosine <= 0.0) {
-        normal = face;
-        cosine = -dot(face, path.direction);
+        i.normal = i.face;
+        cosine = -dot(i.face, path.direction);
     }
-    uint bend = dielectric.ripple > 0.0 ? BENT_BY_RIPPLES : BENT_BY_SHAPE;
-    float eta = !liquid || enters ? dielectric.index : 1.0 / dielectric.index;
-    float mirrored = fresnel(min(cosine, 1.0), eta);
-    if (!liquid && (material.flags & MATERIAL_TWO_SIDED) == 0) mirrored = fresnel_pane(mirrored);
-    mirrored *= seen.clear;
+    i.bend = dielectric.ripple > 0.0 ? BENT_BY_RIPPLES : BENT_BY_SHAPE;
+    i.eta = !i.liquid || i.enters ? dielectric.index : 1.0 / dielectric.index;
+    i.mirrored = fresnel(min(cosine, 1.0), i.eta);
+    if (!i.liquid && (material.flags & MATERIAL_TWO_SIDED) == 0) i.mirrored = fresnel_pane(i.mirrored);
+    return i;
+}
+
+// Handles the reflection of the surface; true if the path is mirrored.
+bool pass_interface(inout Path path, SurfacePoint p, Interface i, SeenLayer seen, float t) {
+    Layer layer = seen.linear;
+    float mirrored = i.mirrored * seen.clear;
     vec3 reflected = mirrored + (1.0 - mirrored) * layer.reflected;
     float rest = (1.0 - mirrored) * min(max_component(layer.lit + layer.emission + layer.through), 1.0);
     float weight;
-    if (follows_reflection(path, max_component(reflected), rest, weight)) {
-        path.transmittance *= reflected;
-        path.weight *= weight;
-        reflect_path(path, p, t, face, normal, bend);
-        return true;
-    }
-    path.transmittance *= 1.0 - mirrored;
+    bool follows = follows_reflection(path, max_component(reflected), rest, weight);
+    path.transmittance *= follows ? reflected : vec3(1.0 - mirrored);
     path.weight *= weight;
-    add_layer(path, p, seen, t);
-    path.transmittance *= dielectric.scale;
-    if (!liquid || is_over(path)) return false;
-    vec3 refracted = refract(path.direction, normal, 1.0 / eta);
+    if (follows) reflect_path(path, p, t, i.face, i.normal, i.bend);
+    return follows;
+}
+
+// Continues the path refracted, on the other side of the surface of a liquid.
+void refract_path(inout Path path, SurfacePoint p, Interface i, vec3 absorption, float t) {
+    vec3 refracted = refract(path.direction, i.normal, 1.0 / i.eta);
     // a ripple may refract the ray backwards; it continues straight then
-    if (dot(refracted, face) >= 0.0) refracted = path.direction;
-    path.absorption = enters ? dielectric.absorption : vec3(0.0);
-    path.bent = max(path.bent, bend);
-    redirect_path(path, p, t, -face, normalize(refracted));
-    return true;
+    if (dot(refracted, i.face) >= 0.0) refracted = path.direction;
+    path.absorption = i.enters ? absorption : vec3(0.0);
+    path.bent = max(path.bent, i.bend);
+    redirect_path(path, p, t, -i.face, normalize(refracted));
 }
 
 #endif

@@ -66,6 +66,7 @@ void trace_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder
 #ifndef TRACER_NONE
 // See `no_rays.glsl`.
 const bool rays_needed = false;
+const bool HAS_RAYS = true;
 #define NEEDS_RAYS(answer)
 #endif
 

@@ -43,7 +43,7 @@ fn a_path_is_played_and_its_passes_are_told() {
     // one ray for each pixel at least
     assert!(primary_rays.rays.iter().any(|&rays| rays >= 64.0 * 48.0));
     assert_eq!(primary_rays.ms.len(), 3);
-    assert!(pass("trace_indirect").is_none(), "rt_bounces is 0");
+    assert!(pass("trace_bounce_rays").is_none(), "rt_bounces is 0");
 
     let (report, _) = play(&wanted(false)).expect("it plays");
     assert!(report.passes().iter().all(|p| !p.name.starts_with("trace")));

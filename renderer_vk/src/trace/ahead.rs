@@ -9,10 +9,8 @@ use crate::settings::{DenoiserChoice, Settings};
 
 /// Passes that the settings decide about, or that every frame runs, the slowest to compile first. Others are
 /// compiled when a frame first runs them.
-const AHEAD: [Pass; 32] = [
+const AHEAD: [Pass; 30] = [
     Pass::Primary,
-    Pass::Indirect,
-    Pass::OtherSide,
     Pass::BounceShade,
     Pass::Temporal,
     Pass::PrimarySimple,
@@ -49,12 +47,10 @@ const FOG_AHEAD: [Pass; 2] = [Pass::FogLight, Pass::FogFilter];
 /// Whether frames with these settings run a pass of [`AHEAD`].
 fn is_chosen(pass: Pass, settings: &Settings) -> bool {
     match pass {
-        Pass::OtherSide => !settings.rt_accumulate,
         Pass::SampleLights | Pass::SampledDirect | Pass::Suns => samples_one_light(settings),
         Pass::Direct => !samples_one_light(settings),
-        Pass::BounceRays | Pass::BounceShade | Pass::BounceLight => indirect::is_split(settings),
+        Pass::BounceRays | Pass::BounceShade | Pass::BounceLight => settings.rt_bounces > 0,
         Pass::BounceUpsample => indirect::is_subsampled(settings),
-        Pass::Indirect => settings.rt_bounces > 0 && !indirect::is_split(settings),
         Pass::Temporal
         | Pass::WaveletFirst
         | Pass::WaveletSecond
@@ -109,20 +105,13 @@ mod tests {
 
     #[test]
     fn presets_have_the_passes_of_their_bounces_and_filters() {
-        use Pass::{Antialias, BounceShade, Direct, Indirect, SparseLast, Temporal};
-        let passes = [
-            BounceShade,
-            Indirect,
-            Temporal,
-            SparseLast,
-            Antialias,
-            Direct,
-        ];
+        use Pass::{Antialias, BounceShade, Direct, SparseLast, Temporal};
+        let passes = [BounceShade, Temporal, SparseLast, Antialias, Direct];
         let low = of_preset("low", passes);
-        assert_eq!(low, [false, false, true, false, true, false]);
+        assert_eq!(low, [false, true, false, true, false]);
         let high = of_preset("high", passes);
-        assert_eq!(high, [true, false, true, false, true, false]);
+        assert_eq!(high, [true, true, false, true, false]);
         let reference = of_preset("reference", passes);
-        assert_eq!(reference, [false, true, false, false, false, true]);
+        assert_eq!(reference, [true, false, false, false, true]);
     }
 }

@@ -1,6 +1,6 @@
 //! Recording of the traced look's passes for one view.
 
-use shaders::trace_types::{FilterStep, constants::RAY_TILE};
+use shaders::trace_types::{FilterStep, PassStep, constants::RAY_TILE};
 
 use super::pass_set::{PassSet, Pipeline};
 use super::passes::{Pass, Resource, Size, Switch, TABLE};
@@ -40,8 +40,7 @@ impl FrameFacts {
         match size {
             Size::Traced => traced,
             Size::RayTiles => ray_tiles(traced, pipeline),
-            Size::Gathered if !self.subsampled => traced,
-            Size::Cells | Size::Gathered => traced.map(|n| n.div_ceil(2)),
+            Size::Cells => traced.map(|n| n.div_ceil(2)),
             Size::Strata => traced.map(|n| n.div_ceil(3)),
             Size::FogCells => self.fog_cells,
             Size::Flares => [self.flares, 1],
@@ -98,6 +97,19 @@ impl<'a> FramePasses<'a> {
     pub fn run(&mut self, pass: Pass) -> Result<(), Error> {
         let view = self.view;
         self.record(pass, &view)
+    }
+
+    /// Records run `number` of a pass that has several, for the pixel `part` of each cell where they take turns.
+    ///
+    /// # Errors
+    /// Out of memory, or the driver refuses the pipeline.
+    pub fn run_numbered(&mut self, pass: Pass, number: u32, part: u32) -> Result<(), Error> {
+        let step = PassStep {
+            view: self.view,
+            number,
+            part,
+        };
+        self.record(pass, &step)
     }
 
     /// Records a filter step from `source` to `target`, addresses of texels or indices of images; `spacing`: distance

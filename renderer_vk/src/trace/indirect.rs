@@ -12,22 +12,19 @@ pub fn is_subsampled(settings: &Settings) -> bool {
     denoise::in_use(settings) != DenoiserChoice::None && settings.rt_bounces > 0
 }
 
-/// Whether the rays, the surfaces that they meet, and the light there have a pass each, and not one in common.
-pub fn is_split(settings: &Settings) -> bool {
-    is_subsampled(settings) && settings.rt_bounces == 1
-}
-
-/// Records the passes that gather bounced light.
+/// Records the passes that gather bounced light. Where all pixels gather, the four of a cell take turns, so that the
+/// paths of a quarter of the pixels need memory.
 ///
 /// # Errors
 /// Out of memory, or the driver refuses a pipeline.
-pub fn record(passes: &mut FramePasses<'_>, settings: &Settings) -> Result<(), Error> {
-    if is_split(settings) {
-        passes.run(Pass::BounceRays)?;
-        passes.run(Pass::BounceShade)?;
-        passes.run(Pass::BounceLight)?;
-    } else {
-        passes.run(Pass::Indirect)?;
+pub fn record(passes: &mut FramePasses<'_>, bounces: u32) -> Result<(), Error> {
+    let parts = if passes.facts.subsampled { 1 } else { 4 };
+    for part in 0..parts {
+        for bounce in 0..bounces {
+            passes.run_numbered(Pass::BounceRays, bounce, part)?;
+            passes.run_numbered(Pass::BounceShade, bounce, part)?;
+            passes.run_numbered(Pass::BounceLight, bounce, part)?;
+        }
     }
     if passes.facts.subsampled {
         passes.run(Pass::BounceUpsample)?;

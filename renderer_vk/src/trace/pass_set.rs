@@ -47,6 +47,7 @@ impl PassSet {
     /// # Errors
     /// The driver refuses the pipeline.
     pub fn get(&self, pass: Pass, on: bool) -> Result<&Pipeline, Error> {
+        let pass = pass.row().shares.unwrap_or(pass);
         let place = &self.pipelines[pass as usize][usize::from(on)];
         match place.get() {
             Some(made) => Ok(made),

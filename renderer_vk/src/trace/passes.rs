@@ -26,8 +26,6 @@ pub enum Size {
     RayTiles,
     /// One for each cell of 2 × 2 traced pixels.
     Cells,
-    /// One for each pixel, or cell of 2 × 2 pixels, that gathers bounced light.
-    Gathered,
     /// One for each stratum of 3 × 3 traced pixels.
     Strata,
     /// One for each cell of the light in fog.
@@ -80,9 +78,9 @@ pub enum Resource {
     SampledLights,
     /// Direct light without albedo; the denoiser leaves the sum of all filtered light here.
     DirectLight,
-    /// What the first rays of bounces hit.
+    /// What the rays of a bounce hit.
     BounceHits,
-    /// For each of those hits, the light that its shadow ray tests.
+    /// For each of those hits, the light that its shadow ray tests, and the path that goes on from there.
     BounceLights,
     /// Bounced light without albedo.
     IndirectLight,
@@ -145,6 +143,8 @@ pub struct Row {
     pub size: Size,
     /// Specialization constants, id and value.
     pub constants: &'static [(u32, u32)],
+    /// The pass whose pipelines this one runs.
+    pub shares: Option<Pass>,
     /// Id of the constant that a switch sets to 0 or 1.
     pub switch: Option<(u32, Switch)>,
     /// Resources that an earlier pass of the frame must have written.
@@ -166,6 +166,7 @@ impl Row {
             shader,
             size,
             constants: &[],
+            shares: None,
             switch: None,
             reads: &[],
             may_read: &[],
@@ -214,7 +215,8 @@ passes! {
     }
     /// The side of glass or of a glossy surface that a pixel does not show.
     OtherSide = "trace_other_side", Rays(&shaders::TRACE_PRIMARY), Traced {
-        constants: &[(ids::reflect_refract::OTHER_FIELD, 1)],
+        shares: Some(Pass::Primary),
+        switch: Some((ids::fog_keep::LIT_FOG, LitFog)),
         reads: &[Scene, PrimaryHits, GBuffer],
         writes: &[Other],
     }
@@ -257,10 +259,10 @@ passes! {
         writes: &[DirectLight],
         counter: Some(t::COUNT_DIRECT),
     }
-    /// Rays of a single bounce.
+    /// Rays of a bounce.
     BounceRays = "trace_bounce_rays", Rays(&shaders::TRACE_BOUNCE_RAYS), Cells {
         reads: &[Scene, GBuffer],
-        may_read: &[GradientPixels],
+        may_read: &[GradientPixels, BounceLights],
         writes: &[BounceHits],
         counter: Some(t::COUNT_BOUNCE_RAYS),
     }
@@ -277,14 +279,6 @@ passes! {
         may_read: &[GradientPixels],
         writes: &[IndirectLight],
         counter: Some(t::COUNT_BOUNCE_LIGHT),
-    }
-    /// Paths of any number of bounces.
-    Indirect = "trace_indirect", Rays(&shaders::TRACE_INDIRECT), Gathered {
-        switch: Some((ids::bounce::HAS_FOG, MapFog)),
-        reads: &[Scene, Lights, GBuffer],
-        may_read: &[GradientPixels],
-        writes: &[IndirectLight],
-        counter: Some(t::COUNT_INDIRECT),
     }
     /// Interpolates bounced light to the pixels that did not gather it.
     BounceUpsample = "trace_bounce_upsample", Compute(&shaders::TRACE_BOUNCE_UPSAMPLE_COMP), Cells {

@@ -296,10 +296,10 @@ impl ViewTracer {
         let facts = self.facts(targets, settings, output, params);
         let passes = &mut FramePasses::new(&self.passes, rec, address, facts);
         passes.run(Pass::PrimaryRays)?;
-        passes.run(Pass::PrimarySimple)?;
-        passes.run(Pass::Primary)?;
+        passes.run_numbered(Pass::PrimarySimple, 0, 0)?;
+        passes.run_numbered(Pass::Primary, 0, 0)?;
         if !settings.rt_accumulate {
-            passes.run(Pass::OtherSide)?;
+            passes.run_numbered(Pass::OtherSide, 1, 0)?;
         }
         if facts.flares > 0 {
             passes.run(Pass::FlareRays)?;
@@ -307,7 +307,7 @@ impl ViewTracer {
         self.denoiser.reproject_gradients(passes)?;
         light_directly(passes, settings, params)?;
         if facts.bounces {
-            indirect::record(passes, settings)?;
+            indirect::record(passes, params.transport.bounces)?;
         } else {
             clear_indirect(targets, passes)?;
         }

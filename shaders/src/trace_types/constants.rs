@@ -79,10 +79,9 @@ pub const EXPOSURE_BINS: u32 = 128;
 pub const COUNT_PRIMARY_RAYS: u32 = 0;
 pub const COUNT_PRIMARY: u32 = 1;
 pub const COUNT_DIRECT: u32 = 2;
-pub const COUNT_INDIRECT: u32 = 3;
-pub const COUNT_BOUNCE_RAYS: u32 = 4;
-pub const COUNT_BOUNCE_LIGHT: u32 = 5;
-pub const COUNT_SUNS: u32 = 6;
+pub const COUNT_BOUNCE_RAYS: u32 = 3;
+pub const COUNT_BOUNCE_LIGHT: u32 = 4;
+pub const COUNT_SUNS: u32 = 5;
 
 /// Counters of each counted pass, to reduce contention.
 pub const COUNTER_ROWS: u32 = 64;
@@ -157,6 +156,8 @@ pub const STREAM_FOG: u32 = 3;
 pub const STREAM_SUN: u32 = 4;
 /// Other random numbers of the pass of suns.
 pub const STREAM_SUN_PASS: u32 = 5;
+/// Number of streams: distance between those of the passes of bounces.
+pub const STREAMS: u32 = 6;
 
 /// Streams of the denoiser's random numbers (`dither` in `denoise.glsl`): rounding of the fresh light; with
 /// `rt_denoiser 2` of the number of frames.

@@ -33,6 +33,18 @@ pub struct FilterStep {
     pub padding: u32,
 }
 
+/// Push constants of a pass that runs several times in a frame.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct PassStep {
+    /// The `TraceView`.
+    pub view: u64,
+    /// Number of the run: of the bounce, or 1 for the other side of split paths.
+    pub number: u32,
+    /// Pixel of each cell of 2 × 2, where they take turns.
+    pub part: u32,
+}
+
 /// A node of a bounding volume hierarchy: boxes of up to four children, quantized to a grid of the node (after Ylitie,
 /// Karras and Laine, Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs, HPG 2017).
 #[repr(C)]

@@ -235,7 +235,7 @@ fn tracers_agree_on_maps() {
                 "trace_primary_rays",
                 "trace_primary",
                 "trace_direct",
-                "trace_indirect",
+                "trace_bounce_rays",
             ];
             let timings = device.timings();
             let took: Vec<_> = timings
