@@ -9,6 +9,7 @@ struct CameraRay {
     vec3 origin;
     vec3 direction;      // unit
     vec3 through_middle; // unit: through the centre of the lens
+    float near;          // distance at which the ray passes the near plane
     vec2 seen;           // place in the picture, traced pixels from the left and top
 };
 
@@ -34,6 +35,7 @@ CameraRay camera_ray(ivec2 pixel) {
         ray.origin += offset;
         ray.direction = normalize(direction * VIEW.antialias.focal_distance - offset);
     }
+    ray.near = VIEW.camera.near / dot(ray.direction, VIEW.camera.forward);
     return ray;
 }
 

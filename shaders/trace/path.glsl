@@ -111,7 +111,7 @@ void record_glow(Path path, vec3 emission, LastPlace last) {
     glow_sum += glow;
     if (brightest <= brightest_glow) return;
     brightest_glow = brightest;
-    CameraRay ray = CameraRay(path.origin, path.direction, path.view_direction, vec2(LAUNCH_PIXEL) + vec2(0.5) + VIEW.antialias.jitter);
+    CameraRay ray = CameraRay(path.origin, path.direction, path.view_direction, 0.0, vec2(LAUNCH_PIXEL) + vec2(0.5) + VIEW.antialias.jitter);
     glow_motion = motion_of(ray, last).xyz;
 }
 

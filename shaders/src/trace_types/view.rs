@@ -21,6 +21,8 @@ pub struct CameraView {
     pub absorption: Vec3,
     /// Width of a pixel's cone at distance 1.
     pub pixel_spread: f32,
+    /// Distance of the near plane, units: what lies in front of it is not drawn.
+    pub near: f32,
     /// Stereo offset of this eye: added to the picture's horizontal coordinate (-1 to 1, left to right) for the
     /// direction of a ray.
     pub stereo_shift: f32,

@@ -27,6 +27,7 @@ gpu_tests! {
         layers_are_composed_in_order_however_many_there_are,
         layers_in_one_plane_come_in_drawing_order,
         sprites_are_seen_from_behind,
+        nothing_before_the_near_plane_is_drawn,
     ],
 }
 
@@ -101,6 +102,34 @@ fn layers_are_composed_in_order_however_many_there_are(gpu: &mut Gpu) {
     let exact = over(&[(red, 0.05); 40], back);
     let mean = gpu.mean(&scene, &reference(), 1);
     assert!(close(mean, exact), "{mean} {exact}");
+}
+
+fn nothing_before_the_near_plane_is_drawn(gpu: &mut Gpu) {
+    let [red, back] = [[0.9, 0.1, 0.1], [0.5, 0.6, 0.4]];
+    // the harness has the engine's near plane, 4 units away
+    for (distance, shows) in [(2.0, false), (3.9, false), (4.2, true)] {
+        let empty = || {
+            let mut scene = scene();
+            let wall = scene.material(&[stage::constant(back)], 0);
+            scene.quad(screen(300.0), wall);
+            scene
+        };
+        let mut layered = empty();
+        let pane = layered.material(&[stage::blend(red, 0.5)], TRANSLUCENT);
+        layered.mesh(screen(distance), pane, identity());
+        let mean = gpu.mean(&layered, &reference(), 2);
+        let exact = if shows { &[(red, 0.5)][..] } else { &[] };
+        assert!(
+            close(mean, over(exact, back)),
+            "layer at {distance}: {mean}"
+        );
+        let mut solid = empty();
+        let plain = solid.material(&[stage::constant(red)], 0);
+        solid.quad(screen(distance), plain);
+        let mean = gpu.mean(&solid, &reference(), 2);
+        let exact = over(&[], if shows { red } else { back });
+        assert!(close(mean, exact), "wall at {distance}: {mean}");
+    }
 }
 
 fn paints_of_one_body_are_mixed_as_displayed(gpu: &mut Gpu) {

@@ -194,6 +194,7 @@ fn camera_view(traced: &TracedView<'_>, height: u32) -> CameraView {
             m.geometry.surroundings.absorption(camera.origin)
         }),
         pixel_spread: pixel_spread(camera.tan_y, height),
+        near: camera.near,
         stereo_shift: camera.stereo.slope / camera.tan_x,
         ..camera_frame(traced.scene)
     }
