@@ -134,8 +134,8 @@ fn gloss_throws_back_what_its_picture_shows(gpu: &mut Gpu) {
     let texels: Vec<u8> = [40u8, 216].iter().flat_map(|&v| [v, v, v, 255]).collect();
     let texels = [texels.clone(), texels].concat();
     let picture = square(gpu, 2, &texels);
-    let camera = Vec3::new(0.0, 0.0, 2.0);
-    let mut scene = Scene::new(camera, Vec3::new(0.1, 0.0, 0.0), 30.0, 16);
+    let camera = Vec3::new(0.0, 0.0, 8.0);
+    let mut scene = Scene::new(camera, Vec3::new(0.1, 0.0, 0.0), 12.0, 16);
     scene.images.push(picture.texture_index());
     let stages = [
         stage::constant([0.0; 3]),
