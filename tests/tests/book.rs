@@ -180,6 +180,11 @@ fn fault(page: &Path, target: &str) -> Option<&'static str> {
     if !path.exists() {
         return Some("is no file");
     }
+    // the book is built from its folder alone
+    let outside = |path: &Path| !path.canonicalize().is_ok_and(|p| p.starts_with(book()));
+    if !outside(page) && outside(&path) {
+        return Some("is not in the book");
+    }
     let is_page = path.extension().is_some_and(|e| e == "md");
     let leads = fragment.is_empty() || !is_page || fragments(&read(&path)).contains(fragment);
     (!leads).then_some("is no heading")
@@ -286,6 +291,7 @@ fn faults_of_links_are_seen() {
         ("README.md#nowhere", Some("is no heading")),
         ("#nowhere", Some("is no heading")),
         ("nowhere.md", Some("is no file")),
+        ("../../README.md", Some("is not in the book")),
         ("/README.md", Some("is no relative path")),
         ("", Some("is no relative path")),
     ] {
