@@ -37,8 +37,8 @@ impl Timings {
         self.draws = self.draws.max(stats.draws);
     }
 
-    /// `ms`: mean of each pass over the frames that run it; `gpu_ms` and `cpu_ms`: median and maximum of the frames' sums, for the CPU with the
-    /// medians of its parts; `draws`: largest number of draw calls in a frame.
+    /// `ms`: mean of each pass over the frames that run it; `gpu_ms` and `cpu_ms`: median and maximum of the frames'
+    /// sums, for the CPU with the medians of its parts; `draws`: largest number of draw calls in a frame.
     pub fn report(&self) -> Map<String, Value> {
         let passes: Map<_, _> = self
             .passes

@@ -1,6 +1,5 @@
 #version 460
 // Shades the hits of `bounce_rays.rgen` and samples a light for each; `bounce_light.rgen` traces the shadow rays.
-#define PASS_STEP
 #include "trace/bounce_ray.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;

@@ -7,6 +7,7 @@
 #include "trace/candidate.glsl"
 
 bool rays_needed = false;
+// Constant, so that a compiler removes code behind rays.
 const bool HAS_RAYS = false;
 
 // Placed before code that traces rays: without a tracer the function returns `answer` here.

@@ -30,10 +30,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Dyn
 
 #ifdef FILTER_STEP
 layout(push_constant, scalar) uniform Push { FilterStep push; };
-#elif defined(PASS_STEP)
-layout(push_constant, scalar) uniform Push { PassStep push; };
 #else
-layout(push_constant, scalar) uniform Push { uint64_t view; } push;
+layout(push_constant, scalar) uniform Push { PassStep push; };
 #endif
 #define VIEW (TraceViews(push.view).view)
 

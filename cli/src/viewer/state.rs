@@ -419,7 +419,11 @@ impl Viewer {
         let Some(probe) = &map.probe else {
             return;
         };
-        let met = probe.surface(self.motion.camera.origin, screen.ray(at));
+        let (camera, ray) = (&self.motion.camera, screen.ray(at));
+        let [forward, ..] = camera.axis();
+        // what lies before the near plane is not drawn
+        let near = camera.origin + ray * (self.settings.znear / ray.dot(forward));
+        let met = probe.surface(near, ray);
         self.picked = met
             .and_then(|met| Picked::new(&world.relit, probe, met, &*map.files, &map.diagnostics));
     }

@@ -95,8 +95,7 @@ impl<'a> FramePasses<'a> {
     /// # Errors
     /// Out of memory, or the driver refuses the pipeline.
     pub fn run(&mut self, pass: Pass) -> Result<(), Error> {
-        let view = self.view;
-        self.record(pass, &view)
+        self.run_numbered(pass, 0, 0)
     }
 
     /// Records run `number` of a pass that has several, for the pixel `part` of each cell where they take turns.

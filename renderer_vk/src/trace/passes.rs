@@ -143,7 +143,7 @@ pub struct Row {
     pub size: Size,
     /// Specialization constants, id and value.
     pub constants: &'static [(u32, u32)],
-    /// The pass whose pipelines this one runs.
+    /// The pass whose pipelines this one runs; of the same shader, constants and switch.
     pub shares: Option<Pass>,
     /// Id of the constant that a switch sets to 0 or 1.
     pub switch: Option<(u32, Switch)>,

@@ -20,17 +20,21 @@ fn listed(resources: &[Resource]) -> String {
     names.join(", ")
 }
 
+/// Name of a pass's shader.
+fn shader_of(row: &Row) -> &'static str {
+    match row.shader {
+        Shader::Rays(rays) => rays.pipeline.name(),
+        Shader::Compute(spirv) => spirv.name(),
+    }
+}
+
 /// The table of passes as Markdown.
 fn markdown() -> String {
     let mut text = String::from(
         "| pass | shader | invocations | reads | writes | what it does |\n|---|---|---|---|---|---|\n",
     );
     for row in TABLE {
-        let shader = match row.shader {
-            Shader::Rays(rays) => rays.pipeline.name(),
-            Shader::Compute(spirv) => spirv.name(),
-        };
-        let file = shader.split(' ').next().unwrap_or_default();
+        let file = shader_of(row).split(' ').next().unwrap_or_default();
         let mut reads = listed(row.reads);
         if !row.may_read.is_empty() {
             let _ = write!(reads, " ({})", listed(row.may_read));
@@ -76,6 +80,18 @@ fn everything_read_is_written_by_some_pass() {
             assert!(written.contains(read), "{} reads {read:?}", row.name);
         }
         assert!(!row.writes.is_empty(), "{} writes nothing", row.name);
+    }
+}
+
+#[test]
+fn passes_that_share_pipelines_declare_the_same_ones() {
+    for row in TABLE {
+        let Some(shared) = row.shares.map(Pass::row) else {
+            continue;
+        };
+        let built = |row: &Row| (shader_of(row), row.constants, format!("{:?}", row.switch));
+        assert_eq!(built(row), built(shared), "{}", row.name);
+        assert!(shared.shares.is_none(), "{}", row.name);
     }
 }
 

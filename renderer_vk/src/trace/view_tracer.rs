@@ -296,8 +296,8 @@ impl ViewTracer {
         let facts = self.facts(targets, settings, output, params);
         let passes = &mut FramePasses::new(&self.passes, rec, address, facts);
         passes.run(Pass::PrimaryRays)?;
-        passes.run_numbered(Pass::PrimarySimple, 0, 0)?;
-        passes.run_numbered(Pass::Primary, 0, 0)?;
+        passes.run(Pass::PrimarySimple)?;
+        passes.run(Pass::Primary)?;
         if !settings.rt_accumulate {
             passes.run_numbered(Pass::OtherSide, 1, 0)?;
         }

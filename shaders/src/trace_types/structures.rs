@@ -33,13 +33,13 @@ pub struct FilterStep {
     pub padding: u32,
 }
 
-/// Push constants of a pass that runs several times in a frame.
+/// Push constants of a pass other than a filter step.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct PassStep {
     /// The `TraceView`.
     pub view: u64,
-    /// Number of the run: of the bounce, or 1 for the other side of split paths.
+    /// Number of the run, of a pass with several: of the bounce, or 1 for the other side of split paths.
     pub number: u32,
     /// Pixel of each cell of 2 × 2, where they take turns.
     pub part: u32,

@@ -1,6 +1,7 @@
 //! Models: the light that the engine adds to them, and occlusion of the first-person weapon.
 
 use glam::Vec3;
+use shaders::trace_types::constants as t;
 use shaders::types::{Instance, Stage, constants as c};
 
 use super::harness::{Gpu, Scene, bounced, gpu_tests, identity, rectangle, reference, stage};
@@ -14,6 +15,7 @@ gpu_tests! {
     ],
     each: [
         who_carries_a_weapon_casts_no_shadow_on_it,
+        a_weapon_needs_no_ray_but_the_first,
         who_carries_a_weapon_is_not_in_the_way_of_bounced_light,
     ],
 }
@@ -114,6 +116,17 @@ fn who_carries_a_weapon_casts_no_shadow_on_it(gpu: &mut Gpu) {
         let wall = gpu.mean(&under_a_roof(0), &settings, 4);
         assert_eq!(wall, Vec3::ZERO);
     }
+}
+
+fn a_weapon_needs_no_ray_but_the_first(gpu: &mut Gpu) {
+    gpu.count_rays(true);
+    gpu.render(&armed(), &reference(), 4);
+    let rays = gpu.rays().expect("counted");
+    gpu.count_rays(false);
+    let pixels = 16 * 16;
+    let of = |pass: u32| rays[pass as usize];
+    assert_eq!(of(t::COUNT_PRIMARY_RAYS), pixels);
+    assert_eq!(of(t::COUNT_PRIMARY), 0, "the pass of mirrors and layers");
 }
 
 fn who_carries_a_weapon_is_not_in_the_way_of_bounced_light(gpu: &mut Gpu) {
