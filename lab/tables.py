@@ -38,6 +38,9 @@ TABLES = [
     ("estimators-noise", "traced-look", "| after frames | 1 | 16 | 4096",
      "estimator and map; 1 frame [squared noise / squared mean, times frames]; 16 frames; 4096 frames",
      H100, "2026-11-24", "relight-lab estimators MAP --frames 4096 --size 512x384"),
+    ("light-lists-direct", "traced-look", "| map | lights | not culled",
+     "map; lights; not culled [ms, squared noise / squared mean]; culled [ms, squared noise / squared mean]; "
+     "ratio [ms times noise]", H100, "2026-11-27", "relight-lab estimators MAP --size 512x384"),
     ("quality-places", "traced-look", "| picture | SSIM | FLIP",
      "picture; SSIM; FLIP; noise at rest [median σ/μ]; light off [frames to 10 %]; moving light [SSIM]",
      f"rows 1 and 3: {H100}; others: {H200}", "2026-11-24 (rows 1 and 3), 2026-11-23",
@@ -74,13 +77,6 @@ TABLES = [
     ("maps-converted", "maps-table", "| map | pack | triangles | materials",
      "map; pack; triangles; materials; images; size [MiB]; processor time [s]; errors / warnings",
      "processor", "2026-11-22", "scripts/maps-table"),
-]
-# sentences in place of a table: the pattern of a row
-SENTENCES = [
-    ("light-lists-direct", "traced-look",
-     r"(\w+) \((\d+)(?: lights)?\) ([\d.]+) (?:ms )?and ([\d.]+)(?: ms)?, \*\*([\d.]+)\*\*",
-     "map; lights; not culled [ms]; culled [ms]; ratio", H100, "2026-11-24",
-     "relight-lab estimators MAP --size 512x384"),
 ]
 NUMBER = re.compile(r"(-?[\d.]*\d)(?: (?:%|MiB))?(?: \(([\d.]+)\))?")
 
@@ -136,13 +132,9 @@ def document(name, note, columns, device, date, command, rows):
 
 def main():
     check, differ = "--check" in sys.argv[1:], []
-    jobs = [(t, True) for t in TABLES] + [(t, False) for t in SENTENCES]
-    for (name, note, pattern, columns, device, date, command), is_table in jobs:
+    for name, note, header, columns, device, date, command in TABLES:
         text = (LAB / "notes" / f"{note}.md").read_text()
-        if is_table:
-            rows = [(heading, row) for heading, rows in tables(text.splitlines(), pattern) for row in rows]
-        else:
-            rows = [("", found) for found in re.findall(pattern, re.sub(r"\s+", " ", text))]
+        rows = [(heading, row) for heading, rows in tables(text.splitlines(), header) for row in rows]
         assert rows, f"{name}: lab/notes/{note}.md has no such table"
         made = document(name, note, columns, device, date, command, rows)
         written = json.dumps(made, ensure_ascii=False, indent=1) + "\n"

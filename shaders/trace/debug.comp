@@ -29,7 +29,7 @@ vec3 hue(float angle) {
 }
 
 vec3 cluster_color(uint cluster, vec3 normal) {
-    if (cluster == cell_count()) return vec3(0.5 + 0.3 * normal.z);
+    if (cluster == VIEW.lights.cell_count) return vec3(0.5 + 0.3 * normal.z);
     uint x = cluster * 0x9E3779B1u;
     x ^= x >> 15;
     x *= 0x2C1B3C6Du;
@@ -64,7 +64,7 @@ vec3 debug_color(ivec2 pixel) {
         return size > 0.01 ? hue(atan(-m.offset.y, m.offset.x)) * clamp(log2(1.0 + size) / 6.0, 0.05, 1.0) : vec3(0.0);
     }
     case DEBUG_CLUSTERS: return is_lit ? cluster_color(cell_at(g.position + g.face_normal), g.normal) : NOTHING;
-    case DEBUG_LIGHTS: return is_lit ? heat_count(float(set_count(lights_at(g.position, g.face_normal, g.normal))), 10.0) : NOTHING;
+    case DEBUG_LIGHTS: return is_lit ? heat_count(float(set_count(whole_set(lights_at(g.position, g.face_normal, g.normal)))), 10.0) : NOTHING;
     case DEBUG_SAMPLES: {
         if (!is_lit) return NOTHING;
         float frames = 1.0;

@@ -10,24 +10,23 @@
 #include "trace/random.glsl"
 #include "trace/geometry.glsl"
 
-// The lights that may reach a point: those of a row, the suns, and the list of lights of this frame.
+// The lights that may reach a point: those of a row and its parent, the suns, and the list of lights of this frame.
 struct LightSet {
     uint first;
-    uint listed;
-    uint strong; // number of strong lights, which come first
+    uint listed; // slots of the row
+    uint parent; // NO_PARENT: the row has all listed lights
+    bool swept;
     uint suns;
     uint dynamic_first;
     uint dynamic_count;
 };
 
+// Number of lights of a set without a parent; of others, not below 1 if there is any light.
 uint set_count(LightSet set) { return set.listed + set.suns + set.dynamic_count; }
-
-// Number of cells, each with a row per normal bin; the row of all lights follows them.
-uint cell_count() { return (VIEW.lights.row_count - 1) / NORMAL_BINS; }
 
 // Cell of a point (a piece of a cluster), by a walk through the BSP tree; the number of cells for a point in none.
 uint cell_at(vec3 position) {
-    uint no_cell = cell_count();
+    uint no_cell = VIEW.lights.cell_count;
     uint node_count = VIEW.lights.node_count;
     if (node_count == 0) return no_cell;
     BspNodes nodes = BspNodes(VIEW.lights.nodes);
@@ -58,9 +57,12 @@ uint normal_bin_of(vec3 normal) {
 
 LightSet lights_at(vec3 position, vec3 face_normal, vec3 normal) {
     // a surface point lies on the boundary of leaves: step to the side that the surface faces
-    uint place = cell_at(position + face_normal) * NORMAL_BINS + normal_bin_of(normal);
-    LightRow row = LightRows(VIEW.lights.rows).at[min(place, VIEW.lights.row_count - 1)];
-    LightSet set = LightSet(row.first, row.count, row.strong, row.suns != 0 ? VIEW.lights.sun_count : 0, 0, 0);
+    uint cell = cell_at(position + face_normal);
+    // the row after those of the cells is for points in none
+    uint place = cell * NORMAL_BINS + (cell < VIEW.lights.cell_count ? normal_bin_of(normal) : 0);
+    LightRow row = LightRows(VIEW.lights.rows).at[place];
+    uint suns = (row.flags & LIGHT_ROW_SUNS) != 0 ? VIEW.lights.sun_count : 0;
+    LightSet set = LightSet(row.first, row.count, row.parent, (row.flags & LIGHT_ROW_SWEPT) != 0, suns, 0, 0);
     uint dynamic_rows = VIEW.lights.dynamic_row_count;
     if (dynamic_rows > 0) {
         DynamicRow moving = DynamicRows(VIEW.lights.dynamic_rows).at[min(row.cluster, dynamic_rows - 1)];
@@ -70,12 +72,23 @@ LightSet lights_at(vec3 position, vec3 face_normal, vec3 normal) {
     return set;
 }
 
+// The same lights with all listed ones in one row: the parent's, which also has some that do not reach the point.
+LightSet whole_set(LightSet set) {
+    if (set.parent != NO_PARENT) {
+        LightRow row = LightRows(VIEW.lights.rows).at[set.parent];
+        set.first = row.first;
+        set.listed = row.count;
+        set.parent = NO_PARENT;
+    }
+    return set;
+}
+
 uint light_kind(uint light) { return light >> LIGHT_KIND_SHIFT; }
 uint light_index(uint light) { return light & ((1u << LIGHT_KIND_SHIFT) - 1); }
 
 uint dynamic_light(LightSet set, uint member) { return Indices(VIEW.lights.dynamic_lights).at[set.dynamic_first + member]; }
 
-// A light of the set by index: listed lights first, then suns, then lights of this frame.
+// A light of a set without a parent by index: listed lights first, then suns, then lights of this frame.
 uint light_of_member(LightSet set, uint member) {
     if (member < set.listed) return LightSlots(VIEW.lights.slots).at[set.first + member].light;
     member -= set.listed;
@@ -309,7 +322,7 @@ struct LightChoice {
     float total; // approximate unshadowed light of all candidates; of resampled choices only
 };
 
-// Selects one light, each with about the same probability. `u`, here and below: uniform before and after (see
+// Selects one light of a set without a parent, each with about the same probability. `u`, here and below: uniform before and after (see
 // `rng_decide`), so that with a second number it samples the point on the light.
 LightChoice sample_uniform(LightSet set, inout float u) {
     uint count = set_count(set), length = uint(findMSB(count));
@@ -331,17 +344,67 @@ LightChoice sample_sun(uint count, inout float u) {
     return LightChoice((LIGHT_SUN << LIGHT_KIND_SHIFT) | index, float(count), 0.0);
 }
 
+// A drawn light of a row.
+struct ListedLight {
+    uint light;
+    float chance; // probability of the light
+    float visibility;
+};
+
+float slot_visibility(LightSlot slot) { return unpackUnorm2x16(slot.fractions).y; }
+
+// Draws a slot of a row by its alias table (Walker 1977).
+LightSlot draw_slot(uint first, uint count, float u) {
+    LightSlots slots = LightSlots(VIEW.lights.slots);
+    LightSlot slot = slots.at[first + rng_pick(u, count)];
+    if (u < unpackUnorm2x16(slot.fractions).x) return slot;
+    return slots.at[first + slot.alias];
+}
+
+// The slot of a light in a set's row, if the row states the light.
+bool find_slot(LightSet set, uint light, inout LightSlot slot) {
+    LightSlots slots = LightSlots(VIEW.lights.slots);
+    uint low = 0, high = set.listed;
+    while (low < high) {
+        uint middle = (low + high) / 2;
+        if (slots.at[set.first + middle].light < light) low = middle + 1;
+        else high = middle;
+    }
+    if (low >= set.listed) return false;
+    LightSlot found = slots.at[set.first + low];
+    if (found.light != light) return false;
+    slot = found;
+    return true;
+}
+
+// Draws a listed light: of PARENT_DRAWS equal parts of [0, 1), the first draws from the parent.
+ListedLight draw_listed(LightSet set, float u) {
+    LightSlot slot;
+    if (set.parent == NO_PARENT) slot = draw_slot(set.first, set.listed, u);
+    else {
+        if (!rng_decide(u, 1.0 / float(PARENT_DRAWS))) slot = draw_slot(set.first, set.listed, u);
+        else {
+            LightRow parent = LightRows(VIEW.lights.rows).at[set.parent];
+            slot = draw_slot(parent.first, parent.count, u);
+            slot.chance /= float(PARENT_DRAWS);
+            // of a stated light the row has the probability by both ways
+            find_slot(set, slot.light, slot);
+        }
+    }
+    return ListedLight(slot.light, slot.chance, slot_visibility(slot));
+}
+
 // Resampled importance sampling (Talbot et al. 2005): draws candidates, selects one by its target, and weights it by
-// the inverse of its probability. Candidates come from the row's list by alias tables (Walker 1977), with probabilities
-// from the light's contribution in the cell to surfaces of this normal bin, shadows included; a short list is taken
-// whole. Lights of this frame are candidates by themselves. Suns have a ray of their own: an occluded sun would
-// outweigh all lights that reach its shadow.
+// the inverse of its probability. Candidates come from the row's list by alias tables, with probabilities from the
+// light's contribution in the cell to surfaces of this normal bin, shadows included; a short list is taken whole.
+// Lights of this frame are candidates by themselves. Suns have a ray of their own: an occluded sun would outweigh all
+// lights that reach its shadow.
 LightChoice sample_resampled(LightSet set, vec3 position, vec3 normal, inout float u) {
     uint candidates = max(VIEW.lights.candidates, 1);
-    uint drawn = min(set.listed, candidates), drawn_dynamic = min(set.dynamic_count, candidates);
-    LightSlots slots = LightSlots(VIEW.lights.slots);
+    bool whole = set.parent == NO_PARENT && set.listed <= candidates;
+    uint drawn = whole ? set.listed : candidates, drawn_dynamic = min(set.dynamic_count, candidates);
     float sum = 0.0, selected_target = 0.0;
-    float offset = set.listed > drawn ? rng_next() : 0.0, dynamic_offset = set.dynamic_count > drawn_dynamic ? rng_next() : 0.0;
+    float offset = whole ? 0.0 : rng_next(), dynamic_offset = set.dynamic_count > drawn_dynamic ? rng_next() : 0.0;
     uint selected = 0;
     for (uint i = 0; i < drawn + drawn_dynamic; i++) {
         // decisions consume the digits of a number; renewed every 8 candidates
@@ -349,20 +412,16 @@ LightChoice sample_resampled(LightSet set, vec3 position, vec3 normal, inout flo
         uint light;
         float weight = 1.0, visibility = 1.0;
         if (i < drawn) {
-            uint member = i;
-            // one random number offsets all candidates, each in its part of the list
-            float within = (float(i) + offset) / float(drawn);
-            if (set.listed > drawn) member = rng_pick(within, set.listed);
-            LightSlot slot = slots.at[set.first + member];
-            light = slot.light;
-            visibility = slot.visibility;
-            if (set.listed > drawn) {
-                bool first = within < slot.threshold;
-                if (!first) {
-                    light = slot.alias;
-                    visibility = slot.alias_visibility;
-                }
-                weight = 1.0 / ((first ? slot.chance : slot.alias_chance) * float(drawn));
+            if (whole) {
+                LightSlot slot = LightSlots(VIEW.lights.slots).at[set.first + i];
+                light = slot.light;
+                visibility = slot_visibility(slot);
+            } else {
+                // one random number offsets all candidates, each in its part of the list
+                ListedLight listed = draw_listed(set, (float(i) + offset) / float(drawn));
+                light = listed.light;
+                visibility = listed.visibility;
+                weight = 1.0 / (listed.chance * float(drawn));
             }
         } else {
             uint member = i - drawn;
@@ -378,6 +437,26 @@ LightChoice sample_resampled(LightSet set, vec3 position, vec3 normal, inout flo
         sum += target * weight;
         if (rng_decide(u, target * weight / sum)) {
             selected = light;
+            selected_target = target;
+        }
+    }
+    return LightChoice(selected, selected_target > 0.0 ? sum / selected_target : 0.0, sum);
+}
+
+// The same of those lights that only the parent of the set's row has.
+LightChoice sample_parent(LightSet set, vec3 position, vec3 normal, inout float u) {
+    LightRow parent = LightRows(VIEW.lights.rows).at[set.parent];
+    uint candidates = max(VIEW.lights.candidates, 1);
+    float sum = 0.0, selected_target = 0.0, offset = rng_next();
+    uint selected = 0;
+    for (uint i = 0; i < candidates; i++) {
+        LightSlot slot = draw_slot(parent.first, parent.count, (float(i) + offset) / float(candidates)), stated;
+        float target = light_target(slot.light, position, normal) * slot_visibility(slot);
+        if (!(target > 0.0) || find_slot(set, slot.light, stated)) continue;
+        float weight = 1.0 / (slot.chance * float(candidates));
+        sum += target * weight;
+        if (rng_decide(u, target * weight / sum)) {
+            selected = slot.light;
             selected_target = target;
         }
     }
@@ -407,7 +486,7 @@ LightSample one_light(vec3 position, vec3 face_normal, vec3 normal) {
     if (set_count(set) == 0) return no_light();
     vec2 u = rng_next2();
     LightChoice choice;
-    if (VIEW.lights.selection == SELECT_UNIFORM) choice = sample_uniform(set, u.x);
+    if (VIEW.lights.selection == SELECT_UNIFORM) choice = sample_uniform(whole_set(set), u.x);
     else choice = sample_one(set, position, normal, u.x);
     if (!(choice.weight > 0.0)) return no_light();
     LightSample s = sample_light(choice.light, position, normal, u);

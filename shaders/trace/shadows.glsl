@@ -27,39 +27,75 @@ vec3 arriving(LightSample s, vec3 origin, uint mask) {
     return s.light * filtered(origin, s.direction, s.distance);
 }
 
+// Selects the lights of a set one after another, so that the sum of all selected ones, weighted, has the mean of the
+// light of the whole set. Of a swept list, a light of the row that gives an ALL_RAYS-th of its estimated light or more is
+// always selected; of the others each with a probability in proportion to its estimate, by systematic sampling. The
+// lights that only the parent has are weak in this cell: PARENT_RAYS selections share them.
+struct Enumeration {
+    uint next; // members: slots of the row, suns, lights of this frame, then selections from the parent
+    float scale; // probability over the estimate
+    float phase; // a random number plus the sum of the probabilities so far
+};
+
+float slot_target(LightSlot slot, vec3 position, vec3 normal) {
+    return light_target(slot.light, position, normal) * slot_visibility(slot);
+}
+
+Enumeration enumerate_begin(LightSet set, vec3 position, vec3 normal) {
+    Enumeration e = Enumeration(0, 0.0, 0.0);
+    if (!set.swept) return e;
+    LightSlots slots = LightSlots(VIEW.lights.slots);
+    float sum = 0.0;
+    for (uint i = 0; i < set.listed; i++) sum += slot_target(slots.at[set.first + i], position, normal);
+    if (sum > 0.0) e.scale = float(ALL_RAYS) / sum;
+    e.phase = rng_next();
+    return e;
+}
+
+// The next selected light; weight 0: none is left.
+LightChoice enumerate_next(LightSet set, inout Enumeration e, vec3 position, vec3 normal, inout float u) {
+    uint in_parent = set.parent == NO_PARENT ? 0 : PARENT_RAYS;
+    while (e.next < set_count(set) + in_parent) {
+        uint member = e.next++;
+        if (member >= set_count(set)) {
+            LightChoice choice = sample_parent(set, position, normal, u);
+            choice.weight /= float(PARENT_RAYS);
+            if (choice.weight > 0.0) return choice;
+        } else if (set.swept && member < set.listed) {
+            LightSlot slot = LightSlots(VIEW.lights.slots).at[set.first + member];
+            float chance = min(slot_target(slot, position, normal) * e.scale, 1.0);
+            float before = e.phase;
+            e.phase += chance;
+            if (chance == 1.0 || floor(e.phase) > floor(before)) return LightChoice(slot.light, 1.0 / chance, 0.0);
+        } else return LightChoice(light_of_member(set, member), 1.0, 0.0);
+    }
+    return LightChoice(0, 0.0, 0.0);
+}
+
 // Direct light of a point with the geometric normal `face_normal`, by `samples` independent estimates.
 vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint mask, uint selection, uint samples) {
     LightSet set = lights_at(position, face_normal, normal);
-    uint count = set_count(set);
-    if (count == 0) return vec3(0.0);
+    if (selection == SELECT_UNIFORM) set = whole_set(set);
+    if (set_count(set) == 0) return vec3(0.0);
     vec3 origin = offset_ray(position, face_normal);
     vec3 sum = vec3(0.0);
     samples = max(samples, 1);
-    // rays of one estimate, and how many of them sample a light
-    uint rays = 1, picks = 1;
-    LightSet from = set;
-    if (selection == SELECT_ALL) {
-        // one ray for each strong light; a few of the weak lights are sampled by their contribution
-        uint weak = set.listed - set.strong;
-        from = LightSet(set.first + set.listed, weak, 0, 0, 0, 0);
-        picks = min(weak, WEAK_RAYS);
-        rays = picks + count - weak;
-    } else if (selection == SELECT_RESAMPLED && set.suns > 0) rays = 2;
-    for (uint i = 0; i < samples * rays; i++) {
-        uint ray = i % rays;
+    bool all = selection == SELECT_ALL;
+    Enumeration enumeration = Enumeration(0, 0.0, 0.0);
+    if (all) enumeration = enumerate_begin(set, position, normal);
+    // rays of one estimate
+    uint rays = selection == SELECT_RESAMPLED && set.suns > 0 ? 2 : 1;
+    for (uint i = 0; all || i < samples * rays; i++) {
         LightChoice choice;
         vec2 u = rng_next2();
-        if (selection == SELECT_UNIFORM) choice = sample_uniform(set, u.x);
-        else if (ray >= picks && selection == SELECT_ALL) {
-            uint member = ray - picks;
-            if (member >= set.strong) member += from.listed;
-            choice = LightChoice(light_of_member(set, member), 1.0, 0.0);
-        } else if (ray >= picks) choice = sample_sun(set.suns, u.x);
-        else {
-            choice = sample_resampled(from, position, normal, u.x);
-            choice.weight /= float(picks);
+        if (all) choice = enumerate_next(set, enumeration, position, normal, u.x);
+        else if (selection == SELECT_UNIFORM) choice = sample_uniform(set, u.x);
+        else if (i % rays == 1) choice = sample_sun(set.suns, u.x);
+        else choice = sample_resampled(set, position, normal, u.x);
+        if (!(choice.weight > 0.0)) {
+            if (all) break;
+            continue;
         }
-        if (!(choice.weight > 0.0)) continue;
         LightSample s = sample_light(choice.light, position, normal, u);
         s.light *= choice.weight;
         sum += arriving(s, origin, mask);

@@ -10,7 +10,7 @@ use glam::Vec3;
 use relight::light::{LightRef, LightShare};
 use shaders::types::Fog;
 
-use super::light_rows::listed_light;
+use super::light_lists::listed_light;
 use super::light_tables::luminance;
 use super::light_weights::spread_point;
 use super::lights::MapLightSource;

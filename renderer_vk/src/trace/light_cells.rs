@@ -1,7 +1,7 @@
 //! Cells: subdivisions of clusters, each with its own light list.
 //!
 //! The contribution of a light varies within a large cluster: selection probabilities that fit one end do not fit the
-//! other. Leafs of the map's tree are therefore split along a grid, as fine as the memory for the lists allows, and the
+//! other. Leafs of the map's tree are therefore split along a grid, as fine as the time to estimate the lists allows, and the
 //! tree that shaders walk is extended to the pieces: a few more steps of a walk reach a better list.
 
 use std::collections::HashMap;
@@ -17,7 +17,7 @@ use super::light_normal_bins::{NormalBins, normal_bins};
 /// Grid edges that are tried, units, from the finest; if none fits, clusters stay whole.
 const SIDES: [f32; 7] = [128.0, 192.0, 256.0, 384.0, 512.0, 1024.0, 2048.0];
 
-/// Maximum number of entries of all lists with cells: 80 MiB of slots.
+/// Maximum number of entries of all lists with cells, which rays estimate while a map is loaded.
 const MOST_ENTRIES: f64 = 2_621_440.0;
 
 /// Distance behind a light's plane, units, from which a cell's list omits the light: a shaded point uses the cell one

@@ -363,7 +363,7 @@ impl MapLights {
             grid_origin: grid.origin,
             grid_scale: grid.scale,
             grid_size: grid.size.to_array(),
-            row_count: count(rows.len()),
+            cell_count: count(cells.cells.len()),
             sun_count: count(suns.len()),
             ..t::LightView::default()
         };

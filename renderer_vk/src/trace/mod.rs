@@ -29,6 +29,7 @@ pub mod input;
 pub mod layer_boxes;
 mod lifted;
 pub mod light_cells;
+pub mod light_lists;
 pub mod light_normal_bins;
 pub mod light_rows;
 pub mod light_tables;

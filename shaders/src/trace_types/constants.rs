@@ -104,8 +104,21 @@ pub const SELECT_UNIFORM: u32 = 0;
 pub const SELECT_RESAMPLED: u32 = 1;
 pub const SELECT_ALL: u32 = 2;
 
-/// `SELECT_ALL`: rays of an estimate that the weak lights of a list share.
-pub const WEAK_RAYS: u32 = 3;
+/// `SELECT_ALL`: a light whose part of a point's estimated light is the inverse of this or more has a ray of its own.
+pub const ALL_RAYS: u32 = 64;
+/// `SELECT_ALL`: rays to lights that a cell's row does not state.
+pub const PARENT_RAYS: u32 = 2;
+
+/// [`LightRow`](super::LightRow): suns can reach the cell.
+pub const LIGHT_ROW_SUNS: u32 = 1;
+/// The visibility of the row's lights is known from rays.
+pub const LIGHT_ROW_SWEPT: u32 = 2;
+
+/// A row without a parent.
+pub const NO_PARENT: u32 = 0xFFFF_FFFF;
+
+/// Of this many draws from a row with a parent, one is from the parent.
+pub const PARENT_DRAWS: u32 = 8;
 
 /// Bits of `LightView::flags`.
 pub const LIGHTS_SOFT: u32 = 1;

@@ -74,40 +74,35 @@ pub struct LightBounds {
     pub omni_intensity: f32,
 }
 
-/// A slot of a row's alias table: two lights; a number in [0, 1) selects the first if it is below `threshold`.
+/// A slot of a row's alias table: two lights; a number in [0, 1) selects the slot's own light if it is below the
+/// threshold, the light of the slot `alias` otherwise. Slots of a row are in ascending order of their own lights.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct LightSlot {
     /// The slot's own light: each light of a row has one slot.
     pub light: u32,
-    /// The other light.
+    /// Slot with the other light, from the row's first on.
     pub alias: u32,
-    /// Probability of the first light, given the slot.
-    pub threshold: f32,
-    /// Probability of the first light when a slot is drawn uniformly from the row.
+    /// Probability that a draw from the row and its parent selects the slot's own light.
     pub chance: f32,
-    /// The same of the alias.
-    pub alias_chance: f32,
-    /// Approximate part of the light that reaches the row's cell, above 0.
-    pub visibility: f32,
-    /// The same of the alias.
-    pub alias_visibility: f32,
-    /// Makes the size a power of two, so that a slot lies in one sector of a cache line.
-    pub padding: u32,
+    /// Two fractions of 65,535: the threshold in the lower half; in the upper, above 0, the approximate part of the
+    /// light that reaches the row's cell.
+    pub fractions: u32,
 }
 
-/// Light list of a cell for one normal bin: slots from `first` on.
+/// Light list of a cell for one normal bin, or of a cluster: slots from `first` on. A row with a parent holds the lights
+/// whose probability differs most from the parent's; one of `PARENT_DRAWS` draws is from the parent.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct LightRow {
     /// First slot.
     pub first: u32,
-    /// Number of slots: strong lights first.
+    /// Number of slots.
     pub count: u32,
-    /// Number of strong lights. The weak lights have a second alias table behind the row's slots.
-    pub strong: u32,
-    /// 1: suns can reach the cell.
-    pub suns: u32,
+    /// The row that holds all lights of this one, and has no parent; `NO_PARENT` if this row holds them.
+    pub parent: u32,
+    /// `LIGHT_ROW_*` bits.
+    pub flags: u32,
     /// The cluster that contains the cell; no cluster if not below the number of clusters.
     pub cluster: u32,
 }
@@ -144,8 +139,8 @@ pub struct LightView {
     pub spheres: [u64; 2],
     /// [`SunLight`]s.
     pub suns: u64,
-    /// `NORMAL_BINS` [`LightRow`]s of each cell (a piece of a cluster), one for each normal bin; the last row is for
-    /// points in no cell, and holds all lights.
+    /// `NORMAL_BINS` [`LightRow`]s of each cell (a piece of a cluster), one for each normal bin; then one for points in
+    /// no cell, which holds all lights; then those of the clusters.
     pub rows: u64,
     /// [`LightSlot`]s.
     pub slots: u64,
@@ -161,8 +156,8 @@ pub struct LightView {
     pub grid: u64,
     /// Number of nodes; 0: every point lies in no cluster.
     pub node_count: u32,
-    /// Number of rows.
-    pub row_count: u32,
+    /// Number of cells.
+    pub cell_count: u32,
     /// Number of dynamic rows; 0: no lights of this frame.
     pub dynamic_row_count: u32,
     /// Number of suns.

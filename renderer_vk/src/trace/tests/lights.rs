@@ -275,13 +275,54 @@ fn crowd() -> Scene {
     scene
 }
 
-fn estimators_differ_by_noise_alone(gpu: &mut Gpu) {
-    // if pixels are independent and unbiased, their differences have mean zero: then the sum of differences over the
-    // root of the sum of their squares is normally distributed with a deviation of one, in the picture and in each
-    // square of it. Four and a half deviations happen in one picture of some hundred thousand.
+/// The same in a map whose one cluster is cut into cells; rays have measured, not exactly, how much of each light arrives.
+fn crowd_in_cells() -> Scene {
+    let mut scene = crowd();
+    let mut map = q3bsp::builder::MapBuilder::new();
+    map.add_cell(Vec3::splat(-400.0), Vec3::splat(400.0));
+    let lights: Vec<u32> = (0..40).collect();
+    let share = |light: &u32| relight::light::LightShare {
+        bare: 1.0,
+        visible: 0.25 + 0.25 * (light % 4) as f32,
+    };
+    let lists = relight::light::LightLists {
+        // the cluster, and places outside of it
+        offsets: vec![0, 40, 80],
+        shares: lights.iter().map(share).collect(),
+        lights: lights.iter().chain(&lights).copied().collect(),
+        triangle_lights: 40,
+        sky: vec![true],
+    };
+    scene.tree = Some((map.build(), lists));
+    scene
+}
+
+/// If pixels are independent and unbiased, their differences have mean zero: then the sum of differences over the root of
+/// the sum of their squares is normally distributed with a deviation of one, in the picture and in each square of it.
+/// Four and a half deviations happen in one picture of some hundred thousand.
+fn differs_by_noise_alone(pixels: &[Vec3], truth: &[Vec3], what: &str) {
     const BOUND: f32 = 4.5;
+    let score = |chosen: &dyn Fn(usize) -> bool| {
+        let differences = pixels.iter().zip(truth).enumerate();
+        let (sum, squares) = differences
+            .filter(|(i, _)| chosen(*i))
+            .map(|(_, (a, b))| a.x - b.x)
+            .fold((0.0f32, 0.0f32), |(s, q), d| (s + d, q + d * d));
+        sum / squares.sqrt().max(f32::MIN_POSITIVE)
+    };
+    let whole = score(&|_| true);
+    println!("{what}: {whole} standard errors");
+    assert!(whole.abs() < BOUND, "{what}: {whole}");
+    for tile in 0..16 {
+        let part = score(&|i| i % SIDE / 8 == tile % 4 && i / SIDE / 8 == tile / 4);
+        assert!(part.abs() < BOUND, "{what}: tile {tile} {part}");
+    }
+}
+
+fn estimators_differ_by_noise_alone(gpu: &mut Gpu) {
     let scene = crowd();
     let (truth, _) = gpu.render(&scene, &all_lights(), 16);
+    let in_cells = crowd_in_cells();
     for selection in [LightSelection::Uniform, LightSelection::Resampled] {
         // one sample per pixel has a pass of its own
         for (candidates, samples, frames) in [(3, 16, 12), (8, 16, 12), (8, 1, 192)] {
@@ -291,27 +332,15 @@ fn estimators_differ_by_noise_alone(gpu: &mut Gpu) {
                 rt_candidates: candidates,
                 ..all_lights()
             };
-            let (pixels, _) = gpu.render(&scene, &settings, frames);
-            let score = |chosen: &dyn Fn(usize) -> bool| {
-                let differences = pixels.iter().zip(&truth).enumerate();
-                let (sum, squares) = differences
-                    .filter(|(i, _)| chosen(*i))
-                    .map(|(_, (a, b))| a.x - b.x)
-                    .fold((0.0f32, 0.0f32), |(s, q), d| (s + d, q + d * d));
-                sum / squares.sqrt().max(f32::MIN_POSITIVE)
-            };
-            let whole = score(&|_| true);
-            println!("{selection:?} {candidates}: {whole} standard errors");
-            assert!(whole.abs() < BOUND, "{selection:?} {candidates}: {whole}");
-            for tile in 0..16 {
-                let part = score(&|i| i % SIDE / 8 == tile % 4 && i / SIDE / 8 == tile / 4);
-                assert!(
-                    part.abs() < BOUND,
-                    "{selection:?} {candidates}: tile {tile} {part}"
-                );
+            for (scene, lists) in [(&scene, "one list"), (&in_cells, "cells")] {
+                let (pixels, _) = gpu.render(scene, &settings, frames);
+                let what = format!("{selection:?}, {candidates} candidates, {lists}");
+                differs_by_noise_alone(&pixels, &truth, &what);
             }
         }
     }
+    let (pixels, _) = gpu.render(&in_cells, &all_lights(), 48);
+    differs_by_noise_alone(&pixels, &truth, "all lights of cells");
 }
 
 fn a_chosen_ray_goes_where_it_was_sent(gpu: &mut Gpu) {
