@@ -5,7 +5,10 @@
 #include "trace/denoise.glsl"
 #include "trace/motion.glsl"
 
-const int TILE = 8;
+// Edge of a work group.
+#ifndef TILE
+#define TILE 8
+#endif
 layout(local_size_x = TILE, local_size_y = TILE) in;
 
 // Depths of the work group's pixels and of those around them; 0: no surface.

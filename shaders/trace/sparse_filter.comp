@@ -1,54 +1,88 @@
 #version 460
-// A pass of the sparse filter: a joint bilateral filter of eight taps scattered over a disc. The pattern is rotated
-// from pixel to pixel and frame to frame, so that neighbours use different taps and the next pass, with a smaller disc,
-// averages their results (Willberger, Musterle, Bergmann, Deferred Hybrid Path Tracing, Ray Tracing Gems, 2019, chapter
-// 26: few taps in several passes in place of a dense kernel). It keeps no variance: the number of accumulated frames
-// estimates the noise.
-#define FILTER_STEP
+// Second pass of the sparse filter: a joint bilateral filter of sixteen taps scattered over a disc, from shared memory.
+// The pattern is rotated from pixel to pixel and frame to frame (Willberger, Musterle, Bergmann, Deferred Hybrid Path
+// Tracing, Ray Tracing Gems, 2019, chapter 26: few scattered taps in place of a dense kernel). The inner taps alone make
+// the history of the next frame, so that a history of many frames is blurred little. It keeps no variance: the number of
+// accumulated frames estimates the noise.
 #include "trace/sparse_filter.glsl"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+const int GROUP = 16, RADIUS = 7, ACROSS = GROUP + 2 * RADIUS;
+layout(local_size_x = GROUP, local_size_y = GROUP) in;
 
-// 1: last pass; writes the image of direct light.
-layout(constant_id = 0) const uint LAST = 0;
+const int TAPS = 16, INNER_TAPS = 5;
+const float LOG2_E = 1.44269504;
+
+// Light, normal and signed inverse depth of the work group's texels and those around, as 16-bit floats: inverse depth is
+// negative for reflections that alternate with refraction, 0 without a surface. 14,400 of the 16,384 bytes that every
+// device has.
+shared uvec4 texels[ACROSS * ACROSS];
+
+struct Tap {
+    vec3 light;
+    float value;
+    vec3 normal;
+    float inverse;
+};
+
+uvec4 shared_texel(uvec2 packed) {
+    if (packed.y == 0) return uvec4(0);
+    // within the range of 16-bit floats
+    vec3 light = min(unpack_light(packed.x), vec3(60000.0)), normal = sparse_normal(packed.y);
+    float inverse = unpackHalf2x16(packed.y & 0x7FFFu).x;
+    if ((packed.y & REFLECTION_BIT) != 0) inverse = -inverse;
+    return uvec4(packHalf2x16(light.rg), packHalf2x16(vec2(light.b, luminance(light))), packHalf2x16(normal.xy), packHalf2x16(vec2(normal.z, inverse)));
+}
+
+Tap shared_tap(int place) {
+    uvec4 t = texels[place];
+    vec2 rest = unpackHalf2x16(t.y), last = unpackHalf2x16(t.w);
+    return Tap(vec3(unpackHalf2x16(t.x), rest.x), rest.y, vec3(unpackHalf2x16(t.z), last.x), last.y);
+}
 
 void main() {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy), corner = ivec2(gl_WorkGroupID.xy) * GROUP - RADIUS;
+    for (int i = int(gl_LocalInvocationIndex); i < ACROSS * ACROSS; i += GROUP * GROUP) {
+        ivec2 from = corner + ivec2(i % ACROSS, i / ACROSS);
+        texels[i] = inside(from) ? shared_texel(SparseTexels(DENOISE.fresh).at[place_of(from)]) : uvec4(0);
+    }
+    barrier();
     if (!inside(pixel)) return;
-    SparseTexel middle = sparse_read(push.source, pixel);
-    if (middle.guide == 0) {
-        if (LAST == 0) SparseTexels(push.target).at[place_of(pixel)] = uvec2(0);
+    uvec2 own = SparseTexels(DENOISE.fresh).at[place_of(pixel)];
+    if (own.y == 0) {
+        SparseTexels(DENOISE.history).at[place_of(pixel)] = uvec2(0);
         return;
     }
-    float depth = sparse_depth(middle.guide), value = luminance(middle.light);
-    vec3 normal = sparse_normal(middle.guide);
+    int place = (int(gl_LocalInvocationID.y) + RADIUS) * ACROSS + int(gl_LocalInvocationID.x) + RADIUS;
+    Tap middle = shared_tap(place);
     vec2 depth_gradient = imageLoad(images_rg16f[DENOISE.depth_gradient], pixel).xy;
-    float frames = max(sparse_frames(middle.guide), 1.0);
     // the noise of one frame is about as large as the light
-    float light_scale = 1.5 * sqrt(frames);
-    float plane_scale = 1.0 / (0.01 + 2.0 * VIEW.camera.pixel_spread * float(push.spacing));
+    float light_scale = LOG2_E * 1.5 * sqrt(max(sparse_frames(own.y), 1.0));
+    float plane_scale = LOG2_E / (0.01 + 2.0 * VIEW.camera.pixel_spread * float(RADIUS));
 
-    float rotation = 2.0 * PI * dither(pixel, DITHER_ROTATION + push.spacing);
-    vec3 sum = middle.light;
-    float total = 1.0;
-    for (int i = 0; i < 8; i++) {
+    float turn = 2.0 * PI * dither(pixel, DITHER_ROTATION);
+    mat2 rotation = float(RADIUS) * mat2(cos(turn), sin(turn), -sin(turn), cos(turn));
+    vec3 sum = middle.light, inner_sum = vec3(0.0);
+    float total = 1.0, inner_total = 1.0;
+    for (int i = 0; i < TAPS; i++) {
         // radii that cover a disc evenly, angles that are far apart (Vogel's spiral)
-        float angle = rotation + float(i) * 2.39996323;
-        vec2 offset = round(vec2(cos(angle), sin(angle)) * sqrt((float(i) + 0.5) / 8.0) * float(push.spacing));
-        ivec2 tap = pixel + ivec2(offset);
-        if (!inside(tap)) continue;
-        SparseTexel other = sparse_read(push.source, tap);
-        if (other.guide == 0 || ((other.guide ^ middle.guide) & REFLECTION_BIT) != 0) continue;
-        float off_plane = abs((1.0 + dot(depth_gradient, offset)) * sparse_depth(other.guide) / depth - 1.0);
-        float alike = max(dot(normal, sparse_normal(other.guide)), 0.0);
+        float angle = float(i) * 2.39996323, radius = sqrt((float(i) + 0.5) / float(TAPS));
+        vec2 offset = round(rotation * (radius * vec2(cos(angle), sin(angle))));
+        Tap other = shared_tap(place + int(offset.y) * ACROSS + int(offset.x));
+        // 1 on the plane of the middle; far from it without a surface, and in the other field
+        float off_plane = abs(other.inverse / middle.inverse - 1.0 - dot(depth_gradient, offset));
+        float alike = max(dot(middle.normal, other.normal), 0.0);
         alike *= alike; alike *= alike; alike *= alike;
         // the larger of both values sets the scale, so that bright outliers are filtered too
-        float away = abs(luminance(other.light) - value) * light_scale / max(max(value, luminance(other.light)), 1.0e-6);
-        float weight = alike * exp(-off_plane * plane_scale - away);
+        float away = abs(other.value - middle.value) * light_scale / max(max(middle.value, other.value), 1.0e-6);
+        float weight = alike * exp2(-off_plane * plane_scale - away);
         sum += other.light * weight;
         total += weight;
+        if (i == INNER_TAPS - 1) {
+            inner_sum = sum;
+            inner_total = total;
+        }
     }
-    middle.light = sum / total;
-    if (LAST != 0) light_write(VIEW.images.direct, pixel, middle.light, dither(pixel, DITHER_FILTERED));
-    else sparse_write(push.target, pixel, middle, dither(pixel, DITHER_FILTERED));
+    SparseTexel kept = SparseTexel(inner_sum / inner_total, own.y);
+    sparse_write(DENOISE.history, pixel, kept, dither(pixel, DITHER_PAST));
+    light_write(VIEW.images.direct, pixel, sum / total, dither(pixel, DITHER_FILTERED));
 }

@@ -9,7 +9,7 @@ use crate::settings::{DenoiserChoice, Settings};
 
 /// Passes that the settings decide about, or that every frame runs, the slowest to compile first. Others are
 /// compiled when a frame first runs them.
-const AHEAD: [Pass; 30] = [
+const AHEAD: [Pass; 28] = [
     Pass::Primary,
     Pass::BounceShade,
     Pass::Temporal,
@@ -35,9 +35,7 @@ const AHEAD: [Pass; 30] = [
     Pass::BounceUpsample,
     Pass::ToneMap,
     Pass::SparseTemporal,
-    Pass::SparseFirst,
-    Pass::SparseSecond,
-    Pass::SparseLast,
+    Pass::SparseFilter,
     Pass::BloomDown,
     Pass::BloomUp,
 ];
@@ -59,7 +57,7 @@ fn is_chosen(pass: Pass, settings: &Settings) -> bool {
         | Pass::GradientReproject
         | Pass::GradientSample
         | Pass::GradientWide => denoise::in_use(settings) == DenoiserChoice::ASvgf,
-        Pass::SparseTemporal | Pass::SparseFirst | Pass::SparseSecond | Pass::SparseLast => {
+        Pass::SparseTemporal | Pass::SparseFilter => {
             denoise::in_use(settings) == DenoiserChoice::Sparse
         }
         Pass::BloomDown | Pass::BloomUp => settings.rt_bloom > 0.0,
@@ -105,8 +103,8 @@ mod tests {
 
     #[test]
     fn presets_have_the_passes_of_their_bounces_and_filters() {
-        use Pass::{Antialias, BounceShade, Direct, SparseLast, Temporal};
-        let passes = [BounceShade, Temporal, SparseLast, Antialias, Direct];
+        use Pass::{Antialias, BounceShade, Direct, SparseFilter, Temporal};
+        let passes = [BounceShade, Temporal, SparseFilter, Antialias, Direct];
         let low = of_preset("low", passes);
         assert_eq!(low, [false, true, false, true, false]);
         let high = of_preset("high", passes);

@@ -10,7 +10,8 @@
 //!    guided by the variance, remove the remaining noise. The result of the first step is the history of the next
 //!    frame; the last step writes the filtered light into the image of direct light.
 //!
-//! `rt_denoiser 2` costs about a third: a running mean over frames, and three passes of few scattered taps.
+//! `rt_denoiser 2` costs about a quarter: a running mean over frames, which a change of the light shortens, and one pass
+//! of few scattered taps.
 
 use shaders::trace_types::DenoiseView;
 use shaders::trace_types::constants as t;
@@ -25,8 +26,6 @@ use crate::settings::{DenoiserChoice, Settings};
 const STRATUM: u32 = 3;
 /// Distances between the taps of the wavelet steps, pixels. A fourth step changed no measure of quality.
 const WAVELET: [u32; 3] = [1, 3, 8];
-/// Radii of the passes of the sparse filter, pixels.
-const SPARSE: [u32; 3] = [3, 9, 5];
 
 /// The filter of frames with these settings. Reference pictures are not filtered.
 pub fn in_use(settings: &Settings) -> DenoiserChoice {
@@ -258,24 +257,18 @@ impl Denoiser {
             passes.run(Pass::Gradient)?;
             passes.run(Pass::GradientWide)?;
         }
-        let (steps, spacings) = match images.tier {
-            Tier::Adaptive => {
-                passes.run(Pass::Temporal)?;
-                let steps = [Pass::WaveletFirst, Pass::WaveletSecond, Pass::WaveletLast];
-                (steps, WAVELET)
-            }
-            Tier::Sparse => {
-                passes.run(Pass::SparseTemporal)?;
-                let steps = [Pass::SparseFirst, Pass::SparseSecond, Pass::SparseLast];
-                (steps, SPARSE)
-            }
-        };
+        if images.tier == Tier::Sparse {
+            passes.run(Pass::SparseTemporal)?;
+            return passes.run(Pass::SparseFilter);
+        }
+        passes.run(Pass::Temporal)?;
         let [history, fresh] = [&images.history, fresh].map(Buffer::address);
         // The first step overwrites the history, which the temporal pass has merged into the fresh light; the last step
         // writes an image.
-        passes.run_step(steps[0], fresh, history, spacings[0])?;
-        passes.run_step(steps[1], history, fresh, spacings[1])?;
-        passes.run_step(steps[2], fresh, fresh, spacings[2])
+        let [first, second, last] = WAVELET;
+        passes.run_step(Pass::WaveletFirst, fresh, history, first)?;
+        passes.run_step(Pass::WaveletSecond, history, fresh, second)?;
+        passes.run_step(Pass::WaveletLast, fresh, fresh, last)
     }
 
     /// Ends the frame: its images become those of the last frame.

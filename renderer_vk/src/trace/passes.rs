@@ -339,26 +339,15 @@ passes! {
         reads: &[FreshLight, DepthGradient],
         writes: &[DirectLight],
     }
-    /// Sparse filter: running mean over frames.
+    /// Sparse filter: running mean over frames, shortened where the light changes.
     SparseTemporal = "trace_sparse_temporal", Compute(&shaders::TRACE_SPARSE_TEMPORAL_COMP), Traced {
         reads: &[GBuffer, DirectLight, IndirectLight],
         writes: &[FreshLight, DepthGradient],
     }
-    /// Sparse filter: first pass of scattered taps; its result is the history of the next frame.
-    SparseFirst = "trace_sparse_filter", Compute(&shaders::TRACE_SPARSE_FILTER_COMP), Traced {
+    /// Sparse filter: scattered taps; the inner ones make the history of the next frame.
+    SparseFilter = "trace_sparse_filter", Compute(&shaders::TRACE_SPARSE_FILTER_COMP), Traced {
         reads: &[FreshLight, DepthGradient],
-        writes: &[LightHistory],
-    }
-    /// Sparse filter: second pass.
-    SparseSecond = "trace_sparse_filter", Compute(&shaders::TRACE_SPARSE_FILTER_COMP), Traced {
-        reads: &[LightHistory, DepthGradient],
-        writes: &[FreshLight],
-    }
-    /// Sparse filter: last pass.
-    SparseLast = "trace_sparse_filter", Compute(&shaders::TRACE_SPARSE_FILTER_COMP), Traced {
-        constants: &[(ids::sparse_filter::LAST, 1)],
-        reads: &[FreshLight, DepthGradient],
-        writes: &[DirectLight],
+        writes: &[LightHistory, DirectLight],
     }
     /// The linear picture; in reference mode the mean over frames.
     Composite = "trace_composite", Compute(&shaders::TRACE_COMPOSITE_COMP), Traced {

@@ -163,8 +163,8 @@ fn lamp(origin: Vec3) -> DynamicLight {
 fn frames_until_true(
     gpu: &mut Gpu,
     scene: &Scene,
-    frames: u32,
-    change: u32,
+    settings: &Settings,
+    [frames, change]: [u32; 2],
     place: impl Fn(u32, &mut TracedScene),
     truth: &[Vec3],
 ) -> u32 {
@@ -177,7 +177,7 @@ fn frames_until_true(
             late = frame + 1 - change;
         }
     };
-    gpu.render_watched(scene, &live(), frames, place, Some(&mut watch));
+    gpu.render_watched(scene, settings, frames, place, Some(&mut watch));
     println!("{:.3?}", errors.get(change as usize..));
     late + 1
 }
@@ -199,18 +199,31 @@ fn light_that_is_switched_is_seen_soon(gpu: &mut Gpu) {
             lit(view);
         }
     };
-    let scratch = frames_until_true(gpu, &scene, 24, 0, |_, _| {}, &dark_truth);
+    let adaptive = live();
+    let scratch = frames_until_true(gpu, &scene, &adaptive, [24, 0], |_, _| {}, &dark_truth);
     assert_eq!(scratch, 1);
-    let off_frames = frames_until_true(gpu, &scene, 48, 24, off, &dark_truth);
-    let on_frames = frames_until_true(gpu, &scene, 48, 24, on, &lit_truth);
+    let off_frames = frames_until_true(gpu, &scene, &adaptive, [48, 24], off, &dark_truth);
+    let on_frames = frames_until_true(gpu, &scene, &adaptive, [48, 24], on, &lit_truth);
     gpu.use_gradients(false);
-    let off_without = frames_until_true(gpu, &scene, 64, 24, off, &dark_truth);
+    let off_without = frames_until_true(gpu, &scene, &adaptive, [64, 24], off, &dark_truth);
     println!(
         "off after {off_frames} frames, on after {on_frames}, off without gradients after {off_without}"
     );
     assert!(off_frames <= 3, "{off_frames}");
     assert!(on_frames <= 3, "{on_frames}");
     assert!(off_without > 6 * off_frames, "{off_without}");
+    let sparse = Settings {
+        rt_denoiser: DenoiserChoice::Sparse,
+        ..live()
+    };
+    // This filter blurs shadows more: its own settled pictures are the reference.
+    let (dark, _) = gpu.render(&scene, &sparse, 48);
+    let (bright, _) = gpu.render_views(&scene, &sparse, 48, |_, view| lit(view));
+    let off_frames = frames_until_true(gpu, &scene, &sparse, [48, 24], off, &dark);
+    let on_frames = frames_until_true(gpu, &scene, &sparse, [48, 24], on, &bright);
+    println!("sparse filter: off after {off_frames} frames, on after {on_frames}");
+    assert!(off_frames <= 4, "{off_frames}");
+    assert!(on_frames <= 4, "{on_frames}");
 }
 
 fn a_moving_light_leaves_no_trail(gpu: &mut Gpu) {
