@@ -2,6 +2,7 @@
 
 mod chromaticity;
 mod estimators;
+mod growth;
 mod light_lists;
 mod looks;
 mod measure;
@@ -26,6 +27,7 @@ pub struct Cli {
 #[derive(Subcommand, Debug)]
 enum Command {
     Estimators(estimators::EstimatorsArgs),
+    Growth(growth::GrowthArgs),
     LightLists(light_lists::LightListsArgs),
     Looks(looks::LooksArgs),
     Measure(measure::MeasureArgs),
@@ -44,6 +46,7 @@ const REPLACED: [(&str, &str, &str); 2] = [
 pub fn run() -> Result<ExitCode> {
     match parse::<Cli>(&REPLACED).command {
         Command::Estimators(args) => estimators::run(&args),
+        Command::Growth(args) => growth::run(&args),
         Command::LightLists(args) => light_lists::run(&args),
         Command::Looks(args) => looks::run(&args),
         Command::Measure(args) => measure::run(&args),

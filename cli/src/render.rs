@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::chosen::{ChosenCamera, ChosenMap};
 use crate::numbers;
-use crate::pictures::{check_name, write_rgb};
+use crate::pictures::{check_name, write_rgb, write_whole};
 use crate::settings::{Assignment, SettingArgs, default, help, value_of};
 use crate::timings::Timings;
 use crate::view::{Camera, draw, load};
@@ -65,8 +65,8 @@ pub struct RenderArgs {
     /// Horizontal field of view, degrees, from 1 to 170
     #[arg(long, default_value_t = 90.0, value_parser = numbers::fov)]
     fov: f32,
-    /// Frames a picture, each with one sample a pixel; default 64. The classic look draws one, but for --timings and
-    /// --stats
+    /// Frames a picture, each with one sample a pixel; default 64. The classic look draws one, but for --timings,
+    /// --frame-times and --stats
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
     /// Pictures of a --path, evenly along it; each has --spp frames
@@ -93,8 +93,12 @@ pub struct RenderArgs {
     #[arg(long)]
     validate: bool,
     /// Print milliseconds as JSON: of the GPU for each pass (mean over the frames), and of GPU and CPU for a frame
+    /// (median, percentiles, worst); the first frames, at most 10, are apart, and the slowest with the pass that was slow
     #[arg(long)]
     timings: bool,
+    /// Write the times of every frame as CSV: milliseconds of GPU, CPU and each pass, and pipelines compiled meanwhile
+    #[arg(long, value_name = "FILE")]
+    frame_times: Option<PathBuf>,
     /// Print the cost of the last frames as JSON: milliseconds, rays and millions of rays a second for each pass, and
     /// GPU memory by purpose
     #[arg(long)]
@@ -226,11 +230,16 @@ impl RenderArgs {
         camera.context("the map has no place for a camera; set one with --view")
     }
 
+    /// Whether the costs of frames are wanted, not their picture alone.
+    fn measures(&self) -> bool {
+        self.timings || self.stats || self.frame_times.is_some()
+    }
+
     /// Number of frames of a picture.
     fn samples(&self) -> u32 {
         match self.look() {
             Look::Traced => self.spp.unwrap_or(64),
-            Look::Classic if self.timings || self.stats => self.spp.unwrap_or(64),
+            Look::Classic if self.measures() => self.spp.unwrap_or(64),
             Look::Classic => 1,
         }
     }
@@ -334,14 +343,15 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         "{msg} {bar:40} {pos}/{len} frames, {eta} left",
     )?);
     bar.set_message(format!("{map} on {}", info.name));
-    let mut timings = Timings::default();
+    let mut timings = Timings::new(&renderer);
     renderer.count_rays(args.stats);
     // standard output has the JSON only
     let json = args.stats || args.timings;
     for Shot { def, written } in &shots {
         let stats = draw(&mut renderer, &entities, def)?;
-        timings.add(&renderer.timings(), &stats);
+        timings.add(&renderer, &stats);
         if let Some(path) = written {
+            timings.finish(&mut renderer)?;
             let picture = renderer.read_pixels()?;
             write_rgb(path, &picture.rgb, picture.width, picture.height)?;
             if json {
@@ -353,6 +363,12 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         bar.inc(1);
     }
     bar.finish_and_clear();
+    if let Some(path) = &args.frame_times {
+        write_whole(path, timings.csv().as_bytes())?;
+    }
+    if args.timings || args.frame_times.is_some() {
+        timings.lines().iter().for_each(|line| eprintln!("{line}"));
+    }
     if args.stats {
         print!("{}", renderer.costs().json());
     }

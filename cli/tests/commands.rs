@@ -40,7 +40,14 @@ fn help_lists_the_commands_of_users_and_those_of_the_lab_apart() {
         "help",
     ];
     assert_eq!(listed(RELIGHT), users);
-    let lab = ["estimators", "light-lists", "looks", "measure", "help"];
+    let lab = [
+        "estimators",
+        "growth",
+        "light-lists",
+        "looks",
+        "measure",
+        "help",
+    ];
     assert_eq!(listed(LAB), lab);
 }
 

@@ -16,8 +16,8 @@ use std::time::{Duration, Instant};
 
 /// Frames before the first that is measured.
 const WARM_UP: usize = 10;
-/// Frames from a frame to the one that knows its GPU times: the renderer works at two frames at a time.
-const LATE: usize = 2;
+/// Frames from a frame to the one that knows its GPU times.
+const LATE: usize = renderer_vk::FRAMES_IN_FLIGHT;
 /// A demo has ended when the game has shown no view of the map for this long.
 const DEMO_ENDED: Duration = Duration::from_secs(3);
 /// A demo that shows no view for this long is not played.

@@ -33,11 +33,13 @@ pub use gpu::{
     CreateSurface, DeviceInfo, DeviceKind, Error as GpuError, RayTracingLimits, Window,
     WindowSource,
 };
-pub use renderer::{CpuTimes, FrameStats, Renderer, RendererOptions, map_options, probe};
+pub use renderer::{
+    CpuTimes, FRAMES_IN_FLIGHT, FrameStats, Renderer, RendererOptions, map_options, probe,
+};
 pub use settings::{
     Anaglyph, DebugOutput, DenoiserChoice, HdrChoice, LightSelection, MapLightChoice, ModelShadows,
     Settings, TextureMode, TracerChoice,
 };
-pub use statistics::{Costs, MemoryPurpose, PassCost};
+pub use statistics::{Costs, MemoryPurpose, PassCost, Spread};
 pub use stereo::Eye;
 pub use world::LightsChanged;

@@ -38,6 +38,9 @@ use output::milliseconds;
 pub use output::{CpuTimes, FrameStats};
 use still::StillRequest;
 
+/// Frames that CPU and GPU work at together: GPU times of a frame are known this many frames later.
+pub const FRAMES_IN_FLIGHT: usize = 2;
+
 /// Options for making a renderer.
 pub struct RendererOptions {
     /// Width of the picture, pixels.
@@ -213,7 +216,7 @@ impl Renderer {
             targets,
             swapchain,
             encoding,
-            ring: FrameRing::new(&device, 2)?,
+            ring: FrameRing::new(&device, FRAMES_IN_FLIGHT)?,
             device,
             _window: owner,
             kept_pipelines,
@@ -266,6 +269,19 @@ impl Renderer {
     pub fn timings(&self) -> Vec<(String, f32)> {
         self.device.measure(true);
         self.device.timings()
+    }
+
+    /// [Serial number](FrameStats::serial) of the frame that [`timings`](Self::timings) is of; 0: of none.
+    pub fn timed_frame(&self) -> u64 {
+        self.device.timed_frame()
+    }
+
+    /// Waits for the oldest frame that the GPU works at, whose timings are then known.
+    ///
+    /// # Errors
+    /// The device is lost or out of memory.
+    pub fn wait_for_oldest(&mut self) -> Result<(), Error> {
+        self.flush(false).map(drop)
     }
 
     /// Changes the size of the picture.

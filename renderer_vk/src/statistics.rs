@@ -1,5 +1,9 @@
 //! Costs of a frame: time and rays of each pass, memory by purpose; as lines and as JSON.
 
+mod spread;
+
+pub use spread::Spread;
+
 use std::fmt::Write as _;
 
 use crate::gpu::{MemoryKind, MemoryUse};

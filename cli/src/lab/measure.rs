@@ -9,6 +9,9 @@
 //! or shiny surface; `rt_debug 11`) and for the others. Light is compared before display: clipping at white and
 //! rounding to black change means.
 
+mod clips;
+mod cut;
+mod matrix;
 mod region;
 mod stage;
 mod table;
@@ -25,6 +28,7 @@ use renderer_vk::api::DynamicLight;
 use renderer_vk::{Renderer, RendererOptions, Settings};
 use serde_json::{Value, json};
 
+use self::clips::Clip;
 use self::region::Regions;
 use self::stage::{Stage, Variant, variants};
 use super::statistics::{luminance, relative_bias, relative_error};
@@ -40,9 +44,11 @@ use crate::view::{Camera, load, map_name, open};
 ///
 /// For each place: similarity of the picture after a short turn of the camera (raw, denoised, denoised and antialiased,
 /// and a baseline with uniform light selection and a denoiser without gradients), noise over time at rest, frames until
-/// a light that was switched off has disappeared, and the trail of a moving light.
+/// a light that was switched off has disappeared, and the trail of a moving light. With --cut, --matrix or --clips
+/// something else in place of it.
 ///
-/// Example: relight-lab measure oa_dm1 kaos2 --reference 4096 -o out/measure
+/// Examples: relight-lab measure oa_dm1 kaos2 --reference 4096 -o out/measure; relight-lab measure oa_dm1 --cut;
+/// relight-lab measure oa_dm1 --clips out/clips --reference 1024 --picture denoised-taa
 #[derive(Args, Debug)]
 pub struct MeasureArgs {
     #[command(flatten)]
@@ -63,6 +69,20 @@ pub struct MeasureArgs {
     /// Keep the camera still; game time runs
     #[arg(long)]
     stand: bool,
+    /// Similarity 1, 2, 4, 8, 16 and 32 frames after the camera turned by 180 degrees at once
+    #[arg(long, conflicts_with_all = ["matrix", "clips"])]
+    cut: bool,
+    /// Similarity, noise and GPU time with 1, 2, 4, 8, 16 and all light samples, each with each denoiser, with and
+    /// without temporal antialiasing
+    #[arg(long, conflicts_with = "clips")]
+    matrix: bool,
+    /// Write pictures of a camera that walks from each place to this folder, and of the reference of each; lab/jod.py
+    /// compares them
+    #[arg(long, value_name = "DIR")]
+    clips: Option<PathBuf>,
+    /// Frames of a clip
+    #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(1..))]
+    clip_frames: u32,
     /// Pictures to make, by the table's names; default: all
     #[arg(long, value_name = "NAME")]
     picture: Vec<String>,
@@ -93,6 +113,31 @@ pub struct MeasureArgs {
     json: bool,
     #[command(flatten)]
     set: SettingArgs,
+}
+
+impl MeasureArgs {
+    /// The chosen variants.
+    fn variants(&self, base: &Settings) -> Vec<Variant> {
+        let mut variants = variants(base);
+        variants.retain(|v| self.picture.is_empty() || self.picture.iter().any(|p| p == v.name));
+        variants
+    }
+
+    /// Frames to draw for a place.
+    fn frames_of_place(&self, base: &Settings) -> u64 {
+        let variants = self.variants(base).len() as u64;
+        let (reference, frames) = (u64::from(self.reference), u64::from(self.frames));
+        if self.clips.is_some() {
+            let shown = u64::from(self.clip_frames);
+            variants * (frames + shown) + shown * reference
+        } else if self.cut {
+            reference + variants * cut::frames(self.frames)
+        } else if self.matrix {
+            reference + matrix::frames(self.frames)
+        } else {
+            reference * 15 / 8 + u64::from(ADAPTATION) + variants * 6 * frames
+        }
+    }
 }
 
 /// Distance of the switched light from the camera, and its radius, units: about an explosion.
@@ -153,11 +198,8 @@ fn place(
     for Variant {
         name: kind,
         settings,
-    } in variants(base)
+    } in args.variants(base)
     {
-        if !args.picture.is_empty() && !args.picture.iter().any(|p| p == kind) {
-            continue;
-        }
         bar.set_message(format!("{name}: {kind}"));
         stage.cut(camera, &settings)?;
         for left in (0..args.frames).rev() {
@@ -374,25 +416,53 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
             true => ruled_cameras(&bsp.entities(), args.views),
             false => args.view.clone(),
         };
-        let (variants, frames) = (variants(&base).len() as u64, u64::from(args.frames));
-        let bar = ProgressBar::new(
-            cameras.len() as u64
-                * (u64::from(args.reference) * 15 / 8
-                    + u64::from(ADAPTATION)
-                    + variants * 6 * frames),
-        );
+        let bar = ProgressBar::new(cameras.len() as u64 * args.frames_of_place(&base));
         bar.set_style(ProgressStyle::with_template(
             "{msg} {bar:30} {pos}/{len} frames, {eta} left",
         )?);
         for (index, camera) in cameras.iter().enumerate() {
             let name = format!("{}-{index}", map_name(&path));
-            let result = place(&mut stage, args, &base, camera, &name, &bar)?;
+            bar.set_message(name.clone());
+            let result = if let Some(folder) = &args.clips {
+                let clip = Clip {
+                    cameras: clips::walk(&bsp, camera, args.clip_frames as usize),
+                    before: args.frames,
+                    reference: args.reference,
+                    variants: &args.variants(&base),
+                };
+                clip.write(&mut stage, &base, &folder.join(&name), &bar)?
+            } else if args.cut || args.matrix {
+                let (truth, _) = stage.reference(&base, camera, &[], args.reference, &bar)?;
+                match args.cut {
+                    true => {
+                        let variants = args.variants(&base);
+                        let before = args.frames;
+                        let figures =
+                            cut::place(&mut stage, &variants, camera, &truth, before, &bar);
+                        Value::Object(figures?)
+                    }
+                    false => {
+                        let each = args.frames;
+                        Value::Array(matrix::place(
+                            &mut stage, &base, camera, &truth, each, &bar,
+                        )?)
+                    }
+                }
+            } else {
+                place(&mut stage, args, &base, camera, &name, &bar)?
+            };
             all.insert(name, result);
         }
         bar.finish_and_clear();
     }
     if args.json {
         println!("{}", Value::Object(all));
+    } else if args.clips.is_some() {
+        all.keys().for_each(|name| println!("{name}"));
+    } else if args.cut {
+        cut::print(&all);
+    } else if args.matrix {
+        matrix::print(&all);
     } else {
         table::print(&all);
     }

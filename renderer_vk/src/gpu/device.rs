@@ -17,6 +17,7 @@ use super::pin::pin_drivers;
 use super::pipeline_cache::{cache_from_bytes, cache_to_bytes};
 use super::render_pass::{FramebufferKey, RenderPassKey};
 use super::select::{self, Abilities, Choice, DeviceInfo};
+use super::timers::FrameTimings;
 use super::upload::Pending;
 
 /// Parameters of a [`Device`].
@@ -78,7 +79,7 @@ pub(crate) struct DeviceInner {
     /// Number of pipelines that exist.
     pub live_pipelines: AtomicU64,
     pub timeline: vk::Semaphore,
-    pub timings: Mutex<Vec<(String, f32)>>,
+    pub timings: Mutex<FrameTimings>,
     /// Passes are timed.
     pub measuring: AtomicBool,
     pub refused: Mutex<HashSet<String>>,
@@ -148,7 +149,7 @@ impl Device {
             compiled: AtomicU64::new(0),
             live_pipelines: AtomicU64::new(0),
             timeline: vk::Semaphore::null(),
-            timings: Mutex::new(Vec::new()),
+            timings: Mutex::new(FrameTimings::default()),
             measuring: AtomicBool::new(true),
             refused: Mutex::new(HashSet::new()),
             // SAFETY: the device was made with one queue of this family.
@@ -203,7 +204,14 @@ impl Device {
     /// GPU milliseconds of each pass of the newest finished frame, in order of recording. Empty if the device has no
     /// timestamps.
     pub fn timings(&self) -> Vec<(String, f32)> {
-        lock(&self.0.timings).clone()
+        lock(&self.0.timings).passes.clone()
+    }
+
+    /// Serial number of the frame that [`timings`](Self::timings) is of, as [`Recorder::serial`] counts; 0: of none.
+    ///
+    /// [`Recorder::serial`]: super::Recorder::serial
+    pub fn timed_frame(&self) -> u64 {
+        lock(&self.0.timings).frame
     }
 
     /// All messages of the validation layer since the device was made.

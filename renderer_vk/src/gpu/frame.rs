@@ -101,7 +101,7 @@ impl FrameRing {
             None => SlotResources::new(&device)?,
         };
         device.0.collect()?;
-        resources.restart()?;
+        resources.restart(self.begun + 1)?;
         lock(&device.0.state).recording = true;
         let available = slot.available;
         self.next = (index + 1) % self.slots.len();

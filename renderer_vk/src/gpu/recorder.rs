@@ -70,14 +70,15 @@ impl SlotResources {
         Ok(slot)
     }
 
-    /// Begins the main command buffer; the GPU has finished the last use of the slot.
-    pub fn restart(&mut self) -> Result<(), Error> {
+    /// Begins the main command buffer of the frame with this serial number; the GPU has finished the last use of the
+    /// slot.
+    pub fn restart(&mut self, frame: u64) -> Result<(), Error> {
         let vk = self.device.vk();
         // SAFETY: no command buffer of the pool is pending.
         unsafe { vk.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty()) }
             .context("vkResetCommandPool")?;
         self.arena.reset();
-        self.timers.clear();
+        self.timers.restart(frame);
         begin(&self.device, self.main)
     }
 
@@ -332,7 +333,7 @@ impl Device {
         record: impl FnOnce(&mut Recorder) -> Result<T, Error>,
     ) -> Result<T, Error> {
         let mut slot = SlotResources::new(self)?;
-        slot.restart()?;
+        slot.restart(0)?;
         let mut recorder = Recorder {
             device: self.clone(),
             cmd: slot.main,

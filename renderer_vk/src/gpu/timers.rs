@@ -11,6 +11,15 @@ use super::graveyard::Garbage;
 /// Passes per query pool; more passes make more pools.
 const PASSES: u32 = 64;
 
+/// GPU time of the passes of a frame.
+#[derive(Default)]
+pub(crate) struct FrameTimings {
+    /// Serial number of the frame; 0: no frame was timed.
+    pub frame: u64,
+    /// Milliseconds of each pass, in order of recording.
+    pub passes: Vec<(String, f32)>,
+}
+
 /// Timestamps of one frame's passes.
 pub(crate) struct Timers {
     device: Device,
@@ -18,6 +27,8 @@ pub(crate) struct Timers {
     /// Names of passes; those after `used` are from earlier frames, kept for their memory.
     names: Vec<String>,
     used: usize,
+    /// Serial number of the frame that is timed.
+    frame: u64,
     /// Query results.
     ticks: Vec<u64>,
 }
@@ -29,13 +40,14 @@ impl Timers {
             pools: Vec::new(),
             names: Vec::new(),
             used: 0,
+            frame: 0,
             ticks: Vec::new(),
         }
     }
 
-    /// Removes the passes of the last use.
-    pub fn clear(&mut self) {
-        self.used = 0;
+    /// Removes the passes of the last use; those that follow belong to `frame`.
+    pub fn restart(&mut self, frame: u64) {
+        (self.used, self.frame) = (0, frame);
     }
 
     /// Adds a pass; returns the pool and the first of its two queries. `None` without timestamps.
@@ -101,7 +113,9 @@ impl Timers {
                 return;
             }
         }
-        let mut times = lock(&inner.timings);
+        let mut timings = lock(&inner.timings);
+        timings.frame = self.frame;
+        let times = &mut timings.passes;
         times.truncate(self.used);
         let names = self.names.iter().take(self.used);
         for (i, (name, t)) in names.zip(self.ticks.chunks_exact(2)).enumerate() {

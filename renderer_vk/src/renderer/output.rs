@@ -20,6 +20,8 @@ use crate::trace::TraceLook;
 /// Counts of one frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FrameStats {
+    /// Number of the frame since the renderer was made, from 1. Reading pictures takes numbers, too.
+    pub serial: u64,
     /// 3D views drawn.
     pub views: u32,
     /// Draw calls of the classic look and the overlay.
@@ -154,7 +156,7 @@ impl Renderer {
     }
 
     /// Records and submits the queue; `end`: it ends a frame, which is presented.
-    fn flush(&mut self, end: bool) -> Result<FrameStats, Error> {
+    pub(super) fn flush(&mut self, end: bool) -> Result<FrameStats, Error> {
         self.queue_image_sheet();
         self.queue_overlay();
         let mut stats = FrameStats::default();
@@ -166,6 +168,7 @@ impl Renderer {
         let begin = Instant::now();
         let mut recorder = self.ring.begin()?;
         let ready = Instant::now();
+        stats.serial = recorder.serial();
         // colour channels that no eye draws keep old content
         if self.shown_anaglyph != self.settings.anaglyph {
             self.shown_anaglyph = self.settings.anaglyph;

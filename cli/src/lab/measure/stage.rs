@@ -5,17 +5,17 @@ use glam::{Mat3, Vec3};
 use indicatif::ProgressBar;
 use relight::compare::Rgb8;
 use renderer_vk::api::{DynamicLight, RefDef, RefEntity, renderfx};
-use renderer_vk::{DebugOutput, DenoiserChoice, LightSelection, Renderer, Settings};
+use renderer_vk::{DebugOutput, DenoiserChoice, FrameStats, LightSelection, Renderer, Settings};
 
 use crate::view::Camera;
 
 /// Rotation of the camera in degrees, and its movement in units, in a frame on its way to a place: about those of a
 /// walking player.
-const TURN: f32 = 0.5;
-const WALK: f32 = 0.75;
+pub const TURN: f32 = 0.5;
+pub const WALK: f32 = 0.75;
 
 /// Duration of a frame on that way, milliseconds, and game time at its end, for surfaces that change with time.
-const FRAME_TIME: u32 = 16;
+pub const FRAME_TIME: u32 = 16;
 const ARRIVAL_TIME: i32 = 60_000;
 
 /// A variant of the picture.
@@ -78,8 +78,27 @@ impl Stage {
     ///
     /// # Errors
     /// The device is lost or out of memory.
-    pub fn frame(&mut self, camera: &Camera, left: u32, lights: &[DynamicLight]) -> Result<()> {
+    pub fn frame(
+        &mut self,
+        camera: &Camera,
+        left: u32,
+        lights: &[DynamicLight],
+    ) -> Result<FrameStats> {
         let camera = on_the_way(camera, if self.stand { 0 } else { left });
+        let time = ARRIVAL_TIME.saturating_sub_unsigned(left.saturating_mul(FRAME_TIME));
+        self.frame_at(&camera, time, lights)
+    }
+
+    /// Draws a frame at this game time, milliseconds.
+    ///
+    /// # Errors
+    /// The device is lost or out of memory.
+    pub fn frame_at(
+        &mut self,
+        camera: &Camera,
+        time_ms: i32,
+        lights: &[DynamicLight],
+    ) -> Result<FrameStats> {
         self.renderer.begin_frame(0);
         self.renderer.clear_scene();
         for entity in &self.entities {
@@ -103,11 +122,10 @@ impl Stage {
             self.renderer.add_light(*light);
         }
         self.renderer.render_scene(&RefDef {
-            time_ms: ARRIVAL_TIME.saturating_sub_unsigned(left.saturating_mul(FRAME_TIME)),
+            time_ms,
             ..camera.ref_def(self.size, self.fov)
         })?;
-        self.renderer.end_frame()?;
-        Ok(())
+        Ok(self.renderer.end_frame()?)
     }
 
     /// Linear luminance of the last frame, before exposure.
@@ -178,13 +196,28 @@ impl Stage {
         frames: u32,
         bar: &ProgressBar,
     ) -> Result<(Rgb8, Vec<f32>)> {
+        self.reference_at(base, (camera, ARRIVAL_TIME), lights, frames, bar)
+    }
+
+    /// The same at this game time, milliseconds.
+    ///
+    /// # Errors
+    /// The device is lost or out of memory.
+    pub fn reference_at(
+        &mut self,
+        base: &Settings,
+        (camera, time_ms): (&Camera, i32),
+        lights: &[DynamicLight],
+        frames: u32,
+        bar: &ProgressBar,
+    ) -> Result<(Rgb8, Vec<f32>)> {
         let settings = Settings {
             rt_accumulate: true,
             ..base.clone()
         };
         self.cut(camera, &settings)?;
         for _ in 0..frames {
-            self.frame(camera, 0, lights)?;
+            self.frame_at(camera, time_ms, lights)?;
             bar.inc(1);
         }
         Ok((self.picture()?, self.light()?))
