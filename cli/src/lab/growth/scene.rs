@@ -17,11 +17,23 @@ const SCRIPT: &str = "
 growth/wall
 {
     {
-        map $whiteimage
-        rgbGen const ( 0.6 0.6 0.6 )
+        map $lightmap
     }
     {
-        map $lightmap
+        map $whiteimage
+        rgbGen const ( 0.6 0.6 0.6 )
+        blendFunc filter
+    }
+}
+growth/floor
+{
+    {
+        map $whiteimage
+        rgbGen exactVertex
+    }
+    {
+        map $whiteimage
+        rgbGen const ( 0.6 0.6 0.6 )
         blendFunc filter
     }
 }
@@ -125,7 +137,8 @@ impl Made {
         let lamp = map.add_shader("growth/lamp", 0, solid);
         map.add_room(wall, LOW, HIGH);
         self.add_lamps(&mut map, lamp);
-        self.add_floor(&mut map, wall);
+        let floor = map.add_shader("growth/floor", 0, solid);
+        self.add_floor(&mut map, floor);
         if self.columns {
             add_columns(&mut map, wall);
         }
@@ -149,7 +162,12 @@ impl Made {
         map.add_box_faces(wall, Vec3::splat(-BOX), Vec3::splat(BOX), false);
         let mut files = MemoryFiles::new();
         files.insert("scripts/growth.shader", SCRIPT)?;
-        files.insert(MAP, map.build().write())?;
+        // a surface without stored light would be shown as white, and not be lit
+        let page = map.add_lightmap([128; 3]);
+        let mut bsp = map.build();
+        let walls = bsp.surfaces.iter_mut().filter(|s| s.shader == wall);
+        walls.for_each(|surface| surface.lightmap = page);
+        files.insert(MAP, bsp.write())?;
         Ok(files)
     }
 
@@ -170,8 +188,9 @@ impl Made {
         }
     }
 
-    /// A floor with waves of about the wanted number of triangles, in surfaces of at most 64 x 64 squares.
-    fn add_floor(&self, map: &mut MapBuilder, wall: ShaderId) {
+    /// A floor with waves of about the wanted number of triangles, in surfaces of at most 64 x 64 squares. Such meshes
+    /// store light in their vertices.
+    fn add_floor(&self, map: &mut MapBuilder, floor: ShaderId) {
         let squares = ((self.triangles as f32 / 2.0).sqrt().round() as usize).max(1);
         let step = (HIGH - LOW).truncate() / squares as f32;
         let vertex = |x: usize, y: usize| {
@@ -200,7 +219,7 @@ impl Made {
                     // clockwise as seen from above
                     .flat_map(|at| [at, at + row, at + 1, at + 1, at + row, at + row + 1])
                     .collect();
-                map.add_soup(wall, &vertices, &indices);
+                map.add_soup(floor, &vertices, &indices);
             }
         }
     }
@@ -326,6 +345,12 @@ mod tests {
             2
         );
         assert!(map(&made).cluster_at(CAMERA.origin) >= 0);
+        let lit = map(&made)
+            .surfaces
+            .iter()
+            .filter(|s| s.lightmap == 0)
+            .count();
+        assert_eq!(lit, 6 + 6 + 24, "walls, the model and the columns");
     }
 
     #[test]
