@@ -69,12 +69,12 @@ vec3 debug_color(ivec2 pixel) {
         if (!is_lit) return NOTHING;
         float frames = 1.0;
         if ((VIEW.flags & VIEW_ACCUMULATE) != 0) frames = float(VIEW.accumulated + 1);
-        else if ((VIEW.flags & VIEW_DENOISE) != 0 && (DENOISE.flags & DENOISE_SPARSE) == 0) frames = max(past_frames(Pasts(DENOISE.past).at[place_of(pixel)]).x, 1.0);
+        else if ((VIEW.flags & VIEW_DENOISE) != 0 && (DENOISE.flags & DENOISE_SPARSE) == 0) frames = max(past_frames(imageLoad(uimages_r32ui[DENOISE.past], pixel).x).x, 1.0);
         return heat_count(frames * float(VIEW.lights.selection == SELECT_ALL ? 1 : VIEW.lights.samples) - 1.0, 12.0);
     }
     case DEBUG_VARIANCE: {
         if (!is_lit || (VIEW.flags & VIEW_DENOISE) == 0 || (DENOISE.flags & DENOISE_SPARSE) != 0) return NOTHING;
-        vec2 variance = past_variance(Pasts(DENOISE.past).at[place_of(pixel)]);
+        vec2 variance = past_variance(imageLoad(uimages_r32ui[DENOISE.past], pixel).x);
         float deviation = sqrt(variance.x + variance.y) / max(luminance(light_of(pixel)), 1.0e-4);
         return heat((log2(max(deviation, 1.0e-4)) + 6.0) / 8.0);
     }

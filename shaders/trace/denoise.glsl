@@ -14,7 +14,8 @@
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer LightTexels { uvec4 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer SparseTexels { uvec2 at[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Pasts { uint at[]; };
+// Of each stratum: change and size of direct light, of indirect light, as 16-bit floats.
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer GradientSums { uvec2 at[]; };
 
 // Edge of a stratum in pixels: each stratum has one gradient sample (Schied et al. 2018, section 4.2).
 const int STRATUM = 3;
@@ -22,6 +23,9 @@ const int STRATUM = 3;
 bool inside(ivec2 pixel) {
     return pixel.x >= 0 && pixel.y >= 0 && pixel.x < int(VIEW.width) && pixel.y < int(VIEW.height);
 }
+
+// Index of a stratum in buffers.
+uint stratum_place(ivec2 stratum) { return uint(stratum.y * ((int(VIEW.width) + STRATUM - 1) / STRATUM) + stratum.x); }
 
 // A number in [0, 1), different for each pixel, frame and `stream` (`DITHER_*`).
 float dither(ivec2 pixel, uint stream) {

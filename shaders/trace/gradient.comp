@@ -52,7 +52,7 @@ void main() {
     for (int i = index; i < WIDE * HIGH; i += ACROSS * DOWN) {
         ivec2 stratum = corner + ivec2(i % WIDE, i / WIDE);
         bool there = all(greaterThanEqual(stratum, ivec2(0))) && all(lessThan(stratum, strata));
-        uvec4 own = there ? imageLoad(uimages_rgba32ui[DENOISE.gradient_samples], stratum) : uvec4(0);
+        uvec4 own = there ? LightTexels(DENOISE.gradient_samples).at[stratum_place(stratum)] : uvec4(0);
         tiles[0][i] = own.xy;
         levels[i] = own.z;
         guides[i] = own.w;
@@ -74,5 +74,5 @@ void main() {
     ivec2 stratum = corner + BORDER + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(stratum, strata))) return;
     uvec2 sums = tiles[1][(int(gl_LocalInvocationID.y) + BORDER) * WIDE + int(gl_LocalInvocationID.x) + BORDER];
-    imageStore(images_rgba16f[DENOISE.gradient_sums], stratum, vec4(unpackHalf2x16(sums.x), unpackHalf2x16(sums.y)));
+    GradientSums(DENOISE.gradient_sums).at[stratum_place(stratum)] = sums;
 }

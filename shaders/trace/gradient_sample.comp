@@ -13,7 +13,8 @@ uint level_of(GradientPixel c) {
 
 uvec2 gradient_at(ivec2 stratum, GradientPixel c) {
     ivec2 pixel = pixel_of(stratum, c.index);
-    vec2 now = vec2(luminance(light_read(VIEW.images.direct, pixel)), luminance(light_read(VIEW.images.indirect, pixel)));
+    vec2 now = vec2(luminance(light_read(VIEW.images.direct, pixel)), 0.0);
+    if (VIEW.transport.bounces != 0) now.y = luminance(light_read(VIEW.images.indirect, pixel));
     // rounded like the stored sample
     now = unpackHalf2x16(packHalf2x16(now));
     vec2 then = unpackHalf2x16(imageLoad(uimages_rgba32ui[DENOISE.sample_surfaces], c.last / STRATUM).z);
@@ -30,5 +31,5 @@ void main() {
         GradientPixel c = gradient_pixel_at(stratum);
         if (c.valid) texel.xyz = uvec3(gradient_at(stratum, c), level_of(c));
     }
-    imageStore(uimages_rgba32ui[DENOISE.gradient_samples], stratum, texel);
+    LightTexels(DENOISE.gradient_samples).at[stratum_place(stratum)] = texel;
 }

@@ -35,13 +35,12 @@ struct History {
 // `range`: least and greatest inverse depth of the same surface.
 void add_tap(inout History h, ivec2 tap, vec3 normal, vec2 range, float weight) {
     if (!inside(tap) || !(weight > 0.0)) return;
-    uint place = place_of(tap);
-    uvec4 texel = LightTexels(DENOISE.history).at[place];
+    uvec4 texel = LightTexels(DENOISE.history).at[place_of(tap)];
     float inverse = guide_inverse(texel.w);
     vec3 bend = guide_components(texel.w) - normal;
     // the inverse depth of a pixel without a surface is 0
     if (inverse < range.x || inverse > range.y || dot(bend, bend) > MAX_NORMAL_DIFFERENCE) return;
-    uint past = Pasts(DENOISE.last_past).at[place];
+    uint past = imageLoad(uimages_r32ui[DENOISE.last_past], tap).x;
     vec2 level = unpackHalf2x16(texel.x) * weight;
     h.light.level += level;
     h.light.green += green_code(texel.y) * level;
@@ -210,5 +209,6 @@ void main() {
     LightTexels(DENOISE.fresh).at[place_of(pixel)] = pack_texel(light, dither(pixel, DITHER_FRESH));
     imageStore(images_rg16f[DENOISE.depth_gradient], pixel, vec4(depth_gradient, 0.0, 0.0));
     float random = dither(pixel, DITHER_PAST);
-    Pasts(DENOISE.past).at[place_of(pixel)] = pack_past(frames, variance, fract(random + vec4(0.0, 0.25, 0.5, 0.75)));
+    uint past = pack_past(frames, variance, fract(random + vec4(0.0, 0.25, 0.5, 0.75)));
+    imageStore(uimages_r32ui[DENOISE.past], pixel, uvec4(past));
 }

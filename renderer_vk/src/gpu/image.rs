@@ -196,6 +196,8 @@ pub struct ImageDesc<'a> {
     pub usage: ImageUsage,
     /// Samples per texel: 1, or 2, 4, 8 for an image that is only an attachment and source of a resolve.
     pub samples: u32,
+    /// Another format of the same size, for [`Image::in_other_format`].
+    pub other_format: Option<Format>,
 }
 
 impl<'a> ImageDesc<'a> {
@@ -210,6 +212,7 @@ impl<'a> ImageDesc<'a> {
             format,
             usage,
             samples: 1,
+            other_format: None,
         }
     }
 
@@ -239,15 +242,27 @@ impl<'a> ImageDesc<'a> {
         if !device.0.features(self.format).contains(needed) {
             return unsupported(format!("{:?} as {needed:?}", self.format));
         }
-        Ok(())
+        match self.other_format {
+            Some(other) if other.block() != self.format.block() => Err(Error::Usage {
+                name: self.name.to_owned(),
+                what: format!("texels of {other:?} differ in size from {:?}", self.format),
+            }),
+            Some(other) if !device.0.features(other).contains(needed) => {
+                unsupported(format!("{other:?} as {needed:?}"))
+            }
+            _ => Ok(()),
+        }
     }
 }
 
 pub(crate) struct ImageInner {
     device: Device,
     pub raw: vk::Image,
-    /// `None`: the image belongs to a swapchain.
+    /// `None`: the image belongs to a swapchain, or to `owner`.
     memory: Mutex<Option<Allocation>>,
+    /// The image whose texels this one reads and writes in another format.
+    owner: Option<Image>,
+    other_format: Option<Format>,
     /// All levels and layers.
     view: vk::ImageView,
     /// Level 0, for storage and drawing.
@@ -320,7 +335,9 @@ impl Image {
         desc.check(device)?;
         let most_mips = 32 - desc.width.max(desc.height).leading_zeros();
         let (mips, layers) = (desc.mips.clamp(1, most_mips), desc.layers.max(1));
-        let info = vk::ImageCreateInfo::default()
+        let formats = [desc.format, desc.other_format.unwrap_or(desc.format)].map(Format::vk);
+        let mut formats = vk::ImageFormatListCreateInfo::default().view_formats(&formats);
+        let mut info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)
             .format(desc.format.vk())
             .extent(vk::Extent3D {
@@ -334,6 +351,11 @@ impl Image {
             .tiling(vk::ImageTiling::OPTIMAL)
             .usage(desc.usage.vk().0)
             .initial_layout(vk::ImageLayout::UNDEFINED);
+        if desc.other_format.is_some() {
+            info = info
+                .flags(vk::ImageCreateFlags::MUTABLE_FORMAT)
+                .push_next(&mut formats);
+        }
         let vk = device.vk();
         // SAFETY: size and format were checked against the device.
         let raw = unsafe { vk.create_image(&info, None) }.context("vkCreateImage")?;
@@ -358,6 +380,8 @@ impl Image {
             device: device.clone(),
             raw,
             memory: Mutex::new(Some(memory)),
+            owner: None,
+            other_format: desc.other_format,
             view: vk::ImageView::null(),
             target: vk::ImageView::null(),
             layout: if only_sampled {
@@ -385,6 +409,46 @@ impl Image {
         Ok(image)
     }
 
+    /// The same texels, read and written in the other format that the image was made for. Passes that use an image in
+    /// both formats in turns need no copy; each overwrites what the other left.
+    ///
+    /// # Errors
+    /// The image was made for one format; out of memory, a full descriptor table.
+    pub fn in_other_format(&self) -> Result<Self, Error> {
+        let own = &self.0;
+        let Some(format) = own.other_format else {
+            return Err(self.misuse("the image was made for one format"));
+        };
+        let mut inner = ImageInner {
+            device: own.device.clone(),
+            raw: own.raw,
+            memory: Mutex::new(None),
+            owner: Some(self.clone()),
+            other_format: Some(own.format),
+            view: vk::ImageView::null(),
+            target: vk::ImageView::null(),
+            layout: own.layout,
+            aspect: own.aspect,
+            width: own.width,
+            height: own.height,
+            mips: own.mips,
+            layers: own.layers,
+            format,
+            usage: own.usage,
+            samples: own.samples,
+            texture: NO_INDEX,
+            storage: NO_INDEX,
+            name: own.name.clone(),
+        };
+        inner.make_views()?;
+        Ok(Self(Arc::new(inner)))
+    }
+
+    /// The image that owns the texels: this one, or the one that it shows [in another format](Self::in_other_format).
+    pub fn owner(&self) -> &Self {
+        self.0.owner.as_ref().unwrap_or(self)
+    }
+
     /// Wraps an image that a swapchain owns.
     pub(crate) fn of_swapchain(
         device: &Device,
@@ -398,6 +462,8 @@ impl Image {
             device: device.clone(),
             raw,
             memory: Mutex::new(None),
+            owner: None,
+            other_format: None,
             view: vk::ImageView::null(),
             target: vk::ImageView::null(),
             layout: vk::ImageLayout::GENERAL,

@@ -63,11 +63,39 @@ pub fn traced_size(settings: &Settings, output: [u32; 2]) -> [u32; 2] {
     output.map(|side| ((side as f32 * scale).round() as u32).clamp(1, side.max(1)))
 }
 
+/// A resolved picture.
+struct Resolved {
+    /// `Rgba16F`: radiance, and the number of frames in it.
+    picture: Image,
+    /// `Rg32Uint`, the same texels: `Targets::other`, until the picture is resolved.
+    other: Image,
+}
+
+impl Resolved {
+    fn new(device: &Device, name: &str, [width, height]: [u32; 2]) -> Result<Self, Error> {
+        let usage = ImageUsage::STORAGE | ImageUsage::SAMPLED;
+        let desc = ImageDesc {
+            other_format: Some(Format::Rg32Uint),
+            ..ImageDesc::new(name, width, height, Format::Rgba16F, usage)
+        };
+        let picture = Image::new(device, &desc)?;
+        Ok(Self {
+            other: picture.in_other_format()?,
+            picture,
+        })
+    }
+}
+
+/// Whether frames with these settings are resolved to images of their own, [`Antialias::other`] among them.
+pub fn resolves(settings: &Settings, output: [u32; 2]) -> bool {
+    Method::of(settings, output) != Method::Plain
+}
+
 /// Resolves traced pictures to the window's size.
 pub struct Antialias {
     sampler: u32,
-    /// Resolved pictures of this frame and the last, while temporal antialiasing is on.
-    resolved: Option<[Image; 2]>,
+    /// Resolved pictures of this frame and the last, while the traced picture is not shown unchanged.
+    resolved: Option<[Resolved; 2]>,
     /// The last frame left a valid resolved picture.
     history: bool,
     frame: u32,
@@ -124,15 +152,14 @@ impl Antialias {
         } else if self
             .resolved
             .as_ref()
-            .is_none_or(|r| [r[0].width(), r[0].height()] != output)
+            .is_none_or(|[r, _]| [r.picture.width(), r.picture.height()] != output)
         {
-            let usage = ImageUsage::STORAGE | ImageUsage::SAMPLED;
-            let make = |name| {
-                let [width, height] = output;
-                let desc = ImageDesc::new(name, width, height, Format::Rgba16F, usage);
-                Image::new(device, &desc)
-            };
-            self.resolved = Some([make("trace resolved")?, make("trace last resolved")?]);
+            // free the old images first: memory may not suffice for both
+            self.resolved = None;
+            self.resolved = Some([
+                Resolved::new(device, "trace resolved", output)?,
+                Resolved::new(device, "trace last resolved", output)?,
+            ]);
             self.history = false;
         }
         self.history &= history && method == self.method;
@@ -141,12 +168,12 @@ impl Antialias {
         let dof = settings.rt_dof && settings.rt_aperture > 0.0;
         self.sharpens = self.resolved.is_some() && settings.rt_sharpness > 0.0;
         let (image, last) = match &self.resolved {
-            Some([now, last]) => (now.storage_index(), last.texture_index()),
+            Some([now, last]) => (now.picture.storage_index(), last.picture.texture_index()),
             None => (0, 0),
         };
         let picture = match &self.resolved {
-            Some([_, last]) if self.sharpens => last,
-            Some([now, _]) => now,
+            Some([_, last]) if self.sharpens => &last.picture,
+            Some([now, _]) => &now.picture,
             None => targets.picture(),
         };
         Ok(AntialiasView {
@@ -169,6 +196,12 @@ impl Antialias {
             anisotropy: settings.anisotropy(),
             sharpness: settings.rt_sharpness,
         })
+    }
+
+    /// An image as `Targets::other`, which nothing else uses before the picture is resolved; `None` if the traced picture
+    /// is shown unchanged.
+    pub fn other(&self) -> Option<&Image> {
+        self.resolved.as_ref().map(|[now, _]| &now.other)
     }
 
     /// Records the passes of the method.
@@ -199,7 +232,8 @@ impl Antialias {
     /// The picture of the last frame, if it was resolved: after [`advance`](Self::advance), which swaps the images.
     pub fn picture(&self) -> Option<&Image> {
         let [sharpened, resolved] = self.resolved.as_ref()?;
-        Some(if self.sharpens { sharpened } else { resolved })
+        let shown = if self.sharpens { sharpened } else { resolved };
+        Some(&shown.picture)
     }
 }
 

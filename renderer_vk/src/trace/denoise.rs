@@ -18,7 +18,7 @@ use shaders::trace_types::constants as t;
 
 use super::frame_passes::FramePasses;
 use super::passes::Pass;
-use super::targets::texels;
+use super::targets::{Targets, texels};
 use crate::gpu::{Buffer, Device, Error, Format, Image, ImageDesc, ImageUsage};
 use crate::settings::{DenoiserChoice, Settings};
 
@@ -42,30 +42,27 @@ enum Tier {
     Sparse,
 }
 
-/// Images for one size of view: 36 bytes a pixel for the adaptive filter, 12 for the sparse one. Light is stored with
+/// Images for one size of view: 32 bytes a pixel for the adaptive filter, 8 for the sparse one. Light is stored with
 /// its guide, for the adaptive filter also with its variance.
 struct Images {
     tier: Tier,
     size: [u32; 2],
     /// History of the last frame. After the temporal pass: the result of the first step, for the next frame.
     history: Buffer,
-    depth_gradient: Image,
     adaptive: Option<AdaptiveImages>,
 }
 
 /// Further images of the adaptive filter.
 struct AdaptiveImages {
-    /// Number of frames and variance, of this frame and the last.
-    past: [Buffer; 2],
+    /// Number of frames and variance, of this frame and the last. This frame's holds bounced light before.
+    past: [Image; 2],
     /// For each stratum, light of one pixel of the last frame.
     samples: Image,
     sample_surfaces: Image,
     /// The gradient samples of this frame.
     gradient_pixels: Image,
     stratum_guide: Image,
-    /// Their gradients: of single strata, then filtered over some and over many strata.
-    gradient_samples: Image,
-    gradient_sums: Image,
+    /// Their gradients, filtered.
     gradient: Image,
 }
 
@@ -87,7 +84,6 @@ impl Images {
             tier,
             size,
             history: texels(device, "trace light history", size, bytes)?,
-            depth_gradient: make(device, "trace depth gradient", size, Format::Rg16F)?,
             adaptive: match tier {
                 Tier::Adaptive => Some(AdaptiveImages::new(device, size)?),
                 Tier::Sparse => None,
@@ -102,15 +98,13 @@ impl AdaptiveImages {
         let strata = |name, format| make(device, name, strata, format);
         Ok(Self {
             past: [
-                texels(device, "trace past", size, 4)?,
-                texels(device, "trace last past", size, 4)?,
+                make(device, "trace past", size, Format::R32Uint)?,
+                make(device, "trace last past", size, Format::R32Uint)?,
             ],
             samples: strata("trace samples", Format::Rgba32Uint)?,
             sample_surfaces: strata("trace sample surfaces", Format::Rgba32Uint)?,
             gradient_pixels: strata("trace gradient pixels", Format::R32Uint)?,
             stratum_guide: strata("trace stratum guide", Format::R32Uint)?,
-            gradient_samples: strata("trace gradient samples", Format::Rgba32Uint)?,
-            gradient_sums: strata("trace gradient sums", Format::Rgba16F)?,
             gradient: strata("trace gradient", Format::Rg16F)?,
         })
     }
@@ -177,6 +171,12 @@ impl Denoiser {
         self.images.is_some()
     }
 
+    /// The image of this frame's bounced light with the adaptive filter: the filter overwrites it once it has read it.
+    pub fn indirect(&self) -> Option<&Image> {
+        let images = self.images.as_ref()?;
+        images.adaptive.as_ref().map(|adaptive| &adaptive.past[0])
+    }
+
     /// The images, if this frame has gradient samples.
     fn gradient_images(&self) -> Option<&Images> {
         let wanted = self.history && self.gradients;
@@ -185,9 +185,9 @@ impl Denoiser {
             .filter(|i| wanted && i.tier == Tier::Adaptive)
     }
 
-    /// Parameters of the passes. `last_seed`: random seed of the last frame; `fresh`: texels for light that is being
-    /// filtered, 16 bytes a pixel.
-    pub fn view(&self, last_seed: u32, fresh: &Buffer) -> DenoiseView {
+    /// Parameters of the passes. `last_seed`: random seed of the last frame; `targets`: images of the view, whose scratch
+    /// memory holds gradients, then light that is being filtered.
+    pub fn view(&self, last_seed: u32, targets: &Targets) -> DenoiseView {
         let nothing = self.nothing.storage_index();
         let empty = DenoiseView {
             flags: 0,
@@ -196,10 +196,10 @@ impl Denoiser {
             sample_surfaces: nothing,
             gradient_pixels: nothing,
             stratum_guide: nothing,
-            gradient_samples: nothing,
-            gradient_sums: nothing,
             gradient: nothing,
-            depth_gradient: nothing,
+            past: nothing,
+            last_past: nothing,
+            depth_gradient: targets.depth_gradient[0].storage_index(),
             ..DenoiseView::default()
         };
         let Some(images) = &self.images else {
@@ -211,23 +211,24 @@ impl Denoiser {
                 | flag(self.gradient_images().is_some(), t::DENOISE_GRADIENTS)
                 | flag(images.tier == Tier::Sparse, t::DENOISE_SPARSE),
             history: images.history.address(),
-            fresh: fresh.address(),
-            depth_gradient: images.depth_gradient.storage_index(),
+            fresh: targets.scratch.address(),
             ..empty
         };
         let Some(adaptive) = &images.adaptive else {
             return view;
         };
+        let strata = images.size.map(|s| u64::from(s.div_ceil(STRATUM)));
+        let strata = strata[0] * strata[1];
         DenoiseView {
             samples: adaptive.samples.storage_index(),
             sample_surfaces: adaptive.sample_surfaces.storage_index(),
             gradient_pixels: adaptive.gradient_pixels.storage_index(),
             stratum_guide: adaptive.stratum_guide.storage_index(),
-            gradient_samples: adaptive.gradient_samples.storage_index(),
-            gradient_sums: adaptive.gradient_sums.storage_index(),
+            gradient_samples: targets.scratch.address(),
+            gradient_sums: targets.scratch.address() + 16 * strata,
             gradient: adaptive.gradient.storage_index(),
-            past: adaptive.past[0].address(),
-            last_past: adaptive.past[1].address(),
+            past: adaptive.past[0].storage_index(),
+            last_past: adaptive.past[1].storage_index(),
             ..view
         }
     }
@@ -244,7 +245,7 @@ impl Denoiser {
     }
 
     /// Filters the traced light together with the history; writes the sum of direct and indirect light into the image
-    /// of direct light. `fresh`: as for [`view`](Self::view).
+    /// of direct light. `fresh`: the scratch memory given to [`view`](Self::view).
     ///
     /// # Errors
     /// Out of memory, or the driver refuses a pipeline.

@@ -25,7 +25,9 @@ struct Images {
     cell: u32,
     cells: [u32; 2],
     weight: Image,
-    /// Light at the points, of this frame and the last.
+    /// Points in fog.
+    points: Image,
+    /// Light at the points, of this frame and the last; one image where earlier frames do not count.
     light: [Image; 2],
     /// Filtered light.
     filtered: Option<Image>,
@@ -39,17 +41,24 @@ impl Images {
             let usage = ImageUsage::STORAGE;
             Image::new(device, &ImageDesc::new(name, width, height, format, usage))
         };
-        let filtered = filtered.then(|| make("trace fog filtered", cells, Format::Rgba16F));
+        let light = make("trace fog light", cells, Format::Rgba16F)?;
+        let (last_light, filtered) = if filtered {
+            let last = make("trace last fog light", cells, Format::Rgba16F)?;
+            (
+                last,
+                Some(make("trace fog filtered", cells, Format::Rgba16F)?),
+            )
+        } else {
+            (light.clone(), None)
+        };
         Ok(Self {
             size,
             cell,
             cells,
             weight: make("trace fog weight", size, Format::R32Uint)?,
-            light: [
-                make("trace fog light", cells, Format::Rgba16F)?,
-                make("trace last fog light", cells, Format::Rgba16F)?,
-            ],
-            filtered: filtered.transpose()?,
+            points: make("trace fog points", cells, Format::Rgba16F)?,
+            light: [light, last_light],
+            filtered,
         })
     }
 }
@@ -115,9 +124,8 @@ impl LitFog {
         self.images.as_ref().filter(|_| self.unseen == 0)
     }
 
-    /// Parameters of the passes. `half`: the half-float image of the picture, which holds the points in fog before the
-    /// picture is composed. `half` and `packed`, an image of packed light, also stand for absent images, because
-    /// software drivers access the images of branches that are not taken.
+    /// Parameters of the passes. `packed`, an image of packed light, and `half`, an image of half floats, stand for
+    /// absent images, because software drivers access the images of branches that are not taken.
     pub fn view(&self, packed: &Image, half: &Image) -> FogView {
         let half = half.storage_index();
         let Some(images) = self.seen() else {
@@ -135,7 +143,7 @@ impl LitFog {
         let [fresh, last] = [0, 1].map(|i| images.light[i].storage_index());
         FogView {
             weight: images.weight.storage_index(),
-            point: half,
+            point: images.points.storage_index(),
             fresh,
             last,
             filtered: images.filtered.as_ref().map_or(fresh, Image::storage_index),

@@ -62,8 +62,10 @@ pub enum Resource {
     Lights,
     /// First hits of the camera's rays.
     PrimaryHits,
-    /// Position, normals, motion and view distance of the surface that a pixel shows.
+    /// Position, motion and view distance of the surface that a pixel shows.
     GBuffer,
+    /// Its normals.
+    Normals,
     /// Albedo of that surface, and the radiance in front of it.
     Shown,
     /// The same for the alternate side of a reflecting or transparent surface.
@@ -96,6 +98,8 @@ pub enum Resource {
     Gradients,
     /// Change of depth from pixel to pixel.
     DepthGradient,
+    /// Number of frames and variance of the light.
+    Past,
     /// Light of this and earlier frames, being filtered.
     FreshLight,
     /// Filtered light for the next frame.
@@ -120,10 +124,16 @@ impl Resource {
     /// Representative of the resources that share memory with this one: writing one of them destroys the others.
     pub fn memory(self) -> Self {
         match self {
-            Self::SampledLights | Self::BounceHits | Self::BounceLights | Self::FreshLight => {
-                Self::PrimaryHits
-            }
-            Self::FogPoints => Self::Picture,
+            Self::SampledLights
+            | Self::BounceHits
+            | Self::BounceLights
+            | Self::GradientSamples
+            | Self::GradientSums
+            | Self::FreshLight => Self::PrimaryHits,
+            Self::Past => Self::IndirectLight,
+            Self::DepthGradient => Self::DirectLight,
+            Self::Normals => Self::Picture,
+            Self::Other => Self::ResolvedPicture,
             other => other,
         }
     }
@@ -204,13 +214,13 @@ passes! {
     PrimarySimple = "trace_primary_simple", Compute(&shaders::TRACE_PRIMARY_RGEN_NO_RAYS), Traced {
         switch: Some((ids::fog_keep::LIT_FOG, LitFog)),
         reads: &[Scene, PrimaryHits],
-        writes: &[GBuffer, Shown, FogPoints],
+        writes: &[GBuffer, Normals, Shown, FogPoints],
     }
     /// The surface that each other pixel shows behind mirrors, portals, glass and liquids, with the layers in front of it.
     Primary = "trace_primary", Rays(&shaders::TRACE_PRIMARY), Traced {
         switch: Some((ids::fog_keep::LIT_FOG, LitFog)),
         reads: &[Scene, PrimaryHits],
-        writes: &[GBuffer, Shown, FogPoints],
+        writes: &[GBuffer, Normals, Shown, FogPoints],
         counter: Some(t::COUNT_PRIMARY),
     }
     /// The side of glass or of a glossy surface that a pixel does not show.
@@ -227,19 +237,19 @@ passes! {
     }
     /// Finds in each stratum a surface of the last frame, which is then shaded again with its old random numbers.
     GradientReproject = "trace_gradient_reproject", Compute(&shaders::TRACE_GRADIENT_REPROJECT_COMP), Strata {
-        reads: &[GBuffer],
+        reads: &[GBuffer, Normals],
         writes: &[GradientPixels],
     }
     /// Samples one light for each pixel, and sorts the rays of a tile by direction.
     SampleLights = "trace_sample_lights", Compute(&shaders::TRACE_SAMPLE_LIGHTS_COMP), Traced {
-        reads: &[Lights, GBuffer],
+        reads: &[Lights, GBuffer, Normals],
         may_read: &[GradientPixels],
         writes: &[SampledLights],
     }
     /// Shadow rays to the sampled lights.
     SampledDirect = "trace_direct", Rays(&shaders::TRACE_DIRECT), RayTiles {
         constants: &[(ids::direct::SAMPLING, t::SAMPLING_LIGHT)],
-        reads: &[Scene, Lights, GBuffer, SampledLights],
+        reads: &[Scene, Lights, GBuffer, Normals, SampledLights],
         may_read: &[GradientPixels],
         writes: &[DirectLight],
         counter: Some(t::COUNT_DIRECT),
@@ -247,21 +257,21 @@ passes! {
     /// Shadow rays to suns, whose light is added.
     Suns = "trace_suns", Rays(&shaders::TRACE_DIRECT), RayTiles {
         constants: &[(ids::direct::SAMPLING, t::SAMPLING_SUNS)],
-        reads: &[Scene, Lights, GBuffer, SampledLights, DirectLight],
+        reads: &[Scene, Lights, GBuffer, Normals, SampledLights, DirectLight],
         may_read: &[GradientPixels],
         writes: &[DirectLight],
         counter: Some(t::COUNT_SUNS),
     }
     /// Direct light where a pixel samples several lights or all.
     Direct = "trace_direct", Rays(&shaders::TRACE_DIRECT), Traced {
-        reads: &[Scene, Lights, GBuffer],
+        reads: &[Scene, Lights, GBuffer, Normals],
         may_read: &[GradientPixels],
         writes: &[DirectLight],
         counter: Some(t::COUNT_DIRECT),
     }
     /// Rays of a bounce.
     BounceRays = "trace_bounce_rays", Rays(&shaders::TRACE_BOUNCE_RAYS), Cells {
-        reads: &[Scene, GBuffer],
+        reads: &[Scene, GBuffer, Normals],
         may_read: &[GradientPixels, BounceLights],
         writes: &[BounceHits],
         counter: Some(t::COUNT_BOUNCE_RAYS),
@@ -269,20 +279,20 @@ passes! {
     /// Shades what they hit, and samples a light for it.
     BounceShade = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
         switch: Some((ids::bounce::HAS_FOG, MapFog)),
-        reads: &[Scene, Lights, GBuffer, BounceHits],
+        reads: &[Scene, Lights, GBuffer, Normals, BounceHits],
         may_read: &[GradientPixels],
         writes: &[BounceLights],
     }
     /// Shadow rays to those lights.
     BounceLight = "trace_bounce_light", Rays(&shaders::TRACE_BOUNCE_LIGHT), Cells {
-        reads: &[Scene, Lights, GBuffer, BounceLights],
+        reads: &[Scene, Lights, GBuffer, Normals, BounceLights],
         may_read: &[GradientPixels],
         writes: &[IndirectLight],
         counter: Some(t::COUNT_BOUNCE_LIGHT),
     }
     /// Interpolates bounced light to the pixels that did not gather it.
     BounceUpsample = "trace_bounce_upsample", Compute(&shaders::TRACE_BOUNCE_UPSAMPLE_COMP), Cells {
-        reads: &[GBuffer, IndirectLight],
+        reads: &[GBuffer, Normals, IndirectLight],
         may_read: &[GradientPixels],
         writes: &[IndirectLight],
     }
@@ -314,9 +324,9 @@ passes! {
     /// A-SVGF: joins the light with that of earlier frames.
     Temporal = "trace_temporal", Compute(&shaders::TRACE_TEMPORAL_COMP), Traced {
         switch: Some((ids::temporal::BOUNCES, Bounces)),
-        reads: &[GBuffer, DirectLight, IndirectLight],
+        reads: &[GBuffer, Normals, DirectLight, IndirectLight],
         may_read: &[GradientPixels, Gradients],
-        writes: &[FreshLight, DepthGradient],
+        writes: &[FreshLight, DepthGradient, Past],
     }
     /// A-SVGF: first wavelet step; its result is the history of the next frame.
     WaveletFirst = "trace_wavelet", Compute(&shaders::TRACE_ATROUS_COMP), Traced {
@@ -341,7 +351,7 @@ passes! {
     }
     /// Sparse filter: running mean over frames, shortened where the light changes.
     SparseTemporal = "trace_sparse_temporal", Compute(&shaders::TRACE_SPARSE_TEMPORAL_COMP), Traced {
-        reads: &[GBuffer, DirectLight, IndirectLight],
+        reads: &[GBuffer, Normals, DirectLight, IndirectLight],
         writes: &[FreshLight, DepthGradient],
     }
     /// Sparse filter: scattered taps; the inner ones make the history of the next frame.
@@ -351,14 +361,14 @@ passes! {
     }
     /// The linear picture; in reference mode the mean over frames.
     Composite = "trace_composite", Compute(&shaders::TRACE_COMPOSITE_COMP), Traced {
-        reads: &[GBuffer, Shown, DirectLight, IndirectLight],
-        may_read: &[Other, FogPoints, FogLight, FilteredFogLight, Gradients],
+        reads: &[GBuffer, Shown, DirectLight],
+        may_read: &[IndirectLight, Other, FogPoints, FogLight, FilteredFogLight, Gradients],
         writes: &[Picture],
     }
     /// Temporal antialiasing, and upscaling with it.
     Antialias = "trace_antialias", Compute(&shaders::TRACE_ANTIALIAS_COMP), Output {
-        reads: &[GBuffer, DirectLight, IndirectLight, Picture],
-        may_read: &[Gradients],
+        reads: &[GBuffer, Shown, DirectLight, Picture],
+        may_read: &[IndirectLight, Gradients],
         writes: &[ResolvedPicture],
     }
     /// Upscaling of a single frame.
@@ -402,7 +412,7 @@ passes! {
     /// An intermediate result in place of the picture (`rt_debug`).
     Debug = "trace_debug", Compute(&shaders::TRACE_DEBUG_COMP), Output {
         reads: &[GBuffer, Picture],
-        may_read: &[Shown, Other, Gradients, DirectLight, IndirectLight],
+        may_read: &[Normals, Shown, Other, Gradients, DirectLight, IndirectLight, Past],
         writes: &[Target],
     }
 }

@@ -25,6 +25,24 @@ pub(super) fn texels(
     )
 }
 
+/// A storage image of a size in pixels.
+fn storage(name: &str, [width, height]: [u32; 2], format: Format) -> ImageDesc<'_> {
+    ImageDesc::new(name, width, height, format, ImageUsage::STORAGE)
+}
+
+/// Images that only some settings need, with memory of their own.
+#[derive(Clone, Copy, Debug)]
+pub struct OwnImages {
+    /// `Targets::accumulation`.
+    pub accumulation: bool,
+    /// `Targets::other`.
+    pub other: bool,
+    /// `Targets::indirect`.
+    pub indirect: bool,
+    /// `Targets::composite`; otherwise it is in the memory of `surface`.
+    pub composite: bool,
+}
+
 /// Images of one size: the G-buffer, light, the picture before tone mapping, and the accumulated mean.
 ///
 /// Formats are given with each image; colours are linear, lengths in units of the map. *Light* has four bytes: three
@@ -41,14 +59,16 @@ pub struct Targets {
     /// bit is set if only camera rays see the surface). Written by `primary_simple` and `primary`, read by all passes
     /// that light or filter.
     pub position: Image,
-    /// `Rg32Uint`: geometric normal and shading normal, packed (`direction.glsl`). Written and read as `position` is.
+    /// `Rg32Uint`: geometric normal and shading normal, packed (`direction.glsl`). Written as `position` is, and read
+    /// until the denoiser has joined the light with its history; `composite` then overwrites it.
     pub surface: Image,
     /// `Rg32Uint`, two of light: albedo times the transmission between camera and surface, and the radiance in front of
     /// the surface plus its own emission. Written by `primary_simple` and `primary`, read by `composite`.
     pub shown: Image,
     /// As `shown`, for pixels that show reflection and refraction alternately: the side that the pixel does not show.
-    /// Written by `trace_other_side`.
-    pub other: Image,
+    /// Written by `trace_other_side`, read by `composite`. Absent in reference mode, and where the image that
+    /// [`Antialias`](super::antialias::Antialias) writes afterwards serves.
+    pub other: Option<Image>,
     /// `Rgba16F`: offset of the surface's pixel in the last frame (pixels, right and down), its view distance in that
     /// frame (negative: unknown), and the pixel's mark (`motion.glsl`). Read by the denoiser and by temporal
     /// antialiasing.
@@ -58,12 +78,16 @@ pub struct Targets {
     /// `R32Uint`, light: direct light of lamps and suns, without albedo; of this frame and the last. Written by
     /// `direct` and `suns`; the denoiser replaces it with the filtered light for `composite`.
     pub direct: [Image; 2],
-    /// Bounced light, in the same format.
-    pub indirect: Image,
+    /// `Rg16F`, in the memory of `direct`: change of depth to the next pixel, which guides the denoiser from its first
+    /// pass, which has read the direct light, to its last, which writes the filtered light.
+    pub depth_gradient: [Image; 2],
+    /// Bounced light, in the same format. Absent where an image of the [`Denoiser`](super::denoise::Denoiser) serves.
+    pub indirect: Option<Image>,
     /// `indirect` holds zeros: it need not be cleared again while there is no bounced light.
     pub indirect_is_black: bool,
     /// `Rgba16F`: radiance at the traced size before exposure; 1 is display white of the classic look. Written by
-    /// `composite`, read by temporal antialiasing or the tone curve.
+    /// `composite`, read by temporal antialiasing or the tone curve. In the memory of `surface`, unless a debug output
+    /// shows the normals after it was written.
     pub composite: Image,
     /// `Rgba32F`: mean of the frames in reference mode; absent outside of it.
     pub accumulation: Option<Image>,
@@ -75,50 +99,83 @@ impl Targets {
     /// # Errors
     /// Out of memory.
     pub fn new(device: &Device, width: u32, height: u32) -> Result<Self, Error> {
-        let make = |name, format| {
-            let usage = ImageUsage::STORAGE;
-            Image::new(device, &ImageDesc::new(name, width, height, format, usage))
+        let size = [width, height];
+        let make = |name, format| Image::new(device, &storage(name, size, format));
+        let shared = |name, format, other_format| {
+            let desc = ImageDesc {
+                other_format: Some(other_format),
+                ..storage(name, size, format)
+            };
+            let image = Image::new(device, &desc)?;
+            Ok((image.clone(), image.in_other_format()?))
         };
+        let (surface, composite) = shared("trace surface", Format::Rg32Uint, Format::Rgba16F)?;
+        let (direct, depth_gradient) = shared("trace direct", Format::R32Uint, Format::Rg16F)?;
+        let (last_direct, last_depth_gradient) =
+            shared("trace last direct", Format::R32Uint, Format::Rg16F)?;
         Ok(Self {
             width,
             height,
             scratch: texels(
                 device,
                 "trace scratch",
-                [width, height].map(|n| n.next_multiple_of(RAY_TILE)),
+                size.map(|n| n.next_multiple_of(RAY_TILE)),
                 16,
             )?,
             position: make("trace position", Format::Rgba32F)?,
-            surface: make("trace surface", Format::Rg32Uint)?,
+            surface,
             shown: make("trace shown", Format::Rg32Uint)?,
-            other: make("trace other", Format::Rg32Uint)?,
+            other: None,
             motion: make("trace motion", Format::Rgba16F)?,
             view_distance: [
                 make("trace path", Format::R16F)?,
                 make("trace last path", Format::R16F)?,
             ],
-            direct: [
-                make("trace direct", Format::R32Uint)?,
-                make("trace last direct", Format::R32Uint)?,
-            ],
-            indirect: make("trace indirect", Format::R32Uint)?,
+            direct: [direct, last_direct],
+            depth_gradient: [depth_gradient, last_depth_gradient],
+            indirect: None,
             indirect_is_black: false,
-            composite: make("trace composite", Format::Rgba16F)?,
+            composite,
             accumulation: None,
         })
     }
 
-    /// Makes or drops the image that only reference mode uses.
+    /// Makes or drops the images that only some settings need.
     ///
     /// # Errors
     /// Out of memory.
-    pub fn fit(&mut self, device: &Device, accumulates: bool) -> Result<(), Error> {
-        if !accumulates {
-            self.accumulation = None;
-        } else if self.accumulation.is_none() {
-            let (name, format) = ("trace accumulation", Format::Rgba32F);
-            let desc = ImageDesc::new(name, self.width, self.height, format, ImageUsage::STORAGE);
-            self.accumulation = Some(Image::new(device, &desc)?);
+    pub fn fit(&mut self, device: &Device, own: OwnImages) -> Result<(), Error> {
+        let size = [self.width, self.height];
+        let make = |name, format| Image::new(device, &storage(name, size, format));
+        let fit = |image: &mut Option<Image>, needed: bool, name, format| {
+            if !needed {
+                *image = None;
+            } else if image.is_none() {
+                *image = Some(make(name, format)?);
+            }
+            Ok::<(), Error>(())
+        };
+        let wide = Format::Rgba32F;
+        fit(
+            &mut self.accumulation,
+            own.accumulation,
+            "trace accumulation",
+            wide,
+        )?;
+        fit(&mut self.other, own.other, "trace other", Format::Rg32Uint)?;
+        self.indirect_is_black &= self.indirect.is_some();
+        fit(
+            &mut self.indirect,
+            own.indirect,
+            "trace indirect",
+            Format::R32Uint,
+        )?;
+        let shares = self.composite.owner().storage_index() == self.surface.storage_index();
+        if shares == own.composite {
+            self.composite = match own.composite {
+                true => make("trace composite", Format::Rgba16F)?,
+                false => self.surface.in_other_format()?,
+            };
         }
         Ok(())
     }
@@ -132,5 +189,6 @@ impl Targets {
     pub fn advance(&mut self) {
         self.view_distance.swap(0, 1);
         self.direct.swap(0, 1);
+        self.depth_gradient.swap(0, 1);
     }
 }

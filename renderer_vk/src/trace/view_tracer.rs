@@ -9,7 +9,7 @@ use shaders::trace_types::constants as t;
 use shaders::trace_types::{CameraView, PortalRecord, PostView, TraceView};
 
 use super::accel::Accel;
-use super::antialias::{Antialias, traced_size};
+use super::antialias::{self, Antialias, traced_size};
 use super::bloom::Bloom;
 use super::counters::RayCounters;
 use super::denoise::{self, Denoiser};
@@ -22,7 +22,7 @@ use super::lights::MapLights;
 use super::motion::Motion;
 use super::pass_set::PassSet;
 use super::passes::{COUNTERS, Pass, Resource};
-use super::targets::Targets;
+use super::targets::{OwnImages, Targets};
 use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
 use crate::scene::TracedScene;
@@ -204,7 +204,7 @@ impl ViewTracer {
         output: [u32; 2],
     ) -> Result<(), Error> {
         let settings = view.settings;
-        targets.fit(&self.device, settings.rt_accumulate)?;
+        targets.fit(&self.device, own_images(settings, output))?;
         let params = self.prepare(targets, rec, view, output)?;
         targets.indirect_is_black &= settings.rt_bounces == 0;
         self.record_passes(targets, rec, settings, output, &params)?;
@@ -382,6 +382,19 @@ impl ViewTracer {
     }
 }
 
+/// The images of `Targets` that cannot share memory with others: a debug output shows them after those were written.
+/// `output`: size of the picture.
+fn own_images(settings: &Settings, output: [u32; 2]) -> OwnImages {
+    let shows_steps = settings.rt_debug != DebugOutput::None;
+    let resolves = antialias::resolves(settings, output);
+    OwnImages {
+        accumulation: settings.rt_accumulate,
+        other: !settings.rt_accumulate && (shows_steps || !resolves),
+        indirect: denoise::in_use(settings) != DenoiserChoice::ASvgf,
+        composite: shows_steps,
+    }
+}
+
 /// Records the passes of direct light.
 fn light_directly(
     passes: &mut FramePasses<'_>,
@@ -406,12 +419,15 @@ pub fn samples_one_light(settings: &Settings) -> bool {
         && settings.rt_num_random_dl == 1
 }
 
-/// Clears bounced light, unless it is black.
+/// Clears bounced light, unless it is black. The adaptive denoiser, whose image holds other data meanwhile, does not
+/// read it.
 fn clear_indirect(targets: &mut Targets, passes: &mut FramePasses<'_>) -> Result<(), Error> {
-    if !targets.indirect_is_black {
+    if let Some(indirect) = &targets.indirect
+        && !targets.indirect_is_black
+    {
         let (rec, access) = (&mut *passes.rec, Access::TRANSFER);
         let mut pass = rec.pass("trace_no_indirect", access, access)?;
-        pass.clear_image(&targets.indirect, [0.0; 4]);
+        pass.clear_image(indirect, [0.0; 4]);
         targets.indirect_is_black = true;
     }
     passes.wrote(Resource::IndirectLight);

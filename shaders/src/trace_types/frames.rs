@@ -47,10 +47,10 @@ pub struct DenoiseView {
     pub history: u64,
     /// Light of this frame, joined with the history.
     pub fresh: u64,
-    /// Number of frames and variance of each pixel.
-    pub past: u64,
-    /// `past` of the last frame.
-    pub last_past: u64,
+    /// Change and size of the light of each stratum's own sample, with its level and guide: 16 bytes a stratum.
+    pub gradient_samples: u64,
+    /// Change and size of direct and indirect light, summed around each stratum: 8 bytes a stratum.
+    pub gradient_sums: u64,
     /// `DENOISE_*` bits.
     pub flags: u32,
     /// Seed of the last frame's random numbers.
@@ -63,14 +63,14 @@ pub struct DenoiseView {
     pub gradient_pixels: u32,
     /// Depth and normal of each stratum.
     pub stratum_guide: u32,
-    /// Change and size of direct and indirect light, summed around each stratum.
-    pub gradient_sums: u32,
     /// Relative change of direct and indirect light of each stratum.
     pub gradient: u32,
     /// Relative change of the inverse depth from pixel to pixel.
     pub depth_gradient: u32,
-    /// Change and size of the light of each stratum's own sample.
-    pub gradient_samples: u32,
+    /// R32UI: number of frames and variance of each pixel. Until the temporal pass writes them it holds bounced light.
+    pub past: u32,
+    /// R32UI: `past` of the last frame.
+    pub last_past: u32,
 }
 
 /// Camera samples, and parameters of antialiasing.

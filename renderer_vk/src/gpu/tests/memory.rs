@@ -238,3 +238,48 @@ fn textures_are_sampled_by_index_with_all_their_levels() {
     drop(again);
     finish(device);
 }
+
+#[test]
+fn texels_are_the_same_in_another_format() {
+    let Some(device) = device(true) else { return };
+    let two = |other_format| ImageDesc {
+        other_format: Some(other_format),
+        ..ImageDesc::new("two", 8, 8, Format::Rgba16F, ImageUsage::STORAGE)
+    };
+    let before = device.memory_report().allocated;
+    let halves = Image::new(&device, &two(Format::Rg32Uint)).unwrap();
+    let one = device.memory_report().allocated - before;
+    let words = halves.in_other_format().unwrap();
+    assert_eq!(device.memory_report().allocated - before, one);
+    assert_eq!(words.format(), Format::Rg32Uint);
+    assert_ne!(words.storage_index(), halves.storage_index());
+    assert_eq!(words.owner().storage_index(), halves.storage_index());
+    // the texels live as long as one of both
+    drop(halves);
+    device
+        .immediate(|recorder| {
+            let mut pass = recorder.pass("clear", Access::TRANSFER, Access::TRANSFER)?;
+            pass.clear_image(words.owner(), [1.0, 2.0, -1.0, 0.0]);
+            Ok(())
+        })
+        .unwrap();
+    let texels: Vec<[u16; 4]> = collect(&device.read_image(&words).unwrap());
+    assert_eq!(texels, [[0x3C00, 0x4000, 0xBC00, 0]; 64]);
+    drop(words);
+    device.wait_idle().unwrap();
+    assert_eq!(device.memory_report().allocated, before);
+
+    assert!(
+        Image::new(&device, &two(Format::R32Uint)).is_err(),
+        "half of the size"
+    );
+    let usage = ImageUsage::STORAGE;
+    let plain = Image::new(
+        &device,
+        &ImageDesc::new("one", 8, 8, Format::Rgba16F, usage),
+    )
+    .unwrap();
+    assert!(plain.in_other_format().is_err());
+    assert_eq!(plain.owner().storage_index(), plain.storage_index());
+    finish(device);
+}

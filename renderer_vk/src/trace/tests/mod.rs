@@ -16,6 +16,7 @@ mod layers;
 mod lighting;
 mod lights;
 mod maps;
+mod memory;
 mod models;
 mod motion;
 mod parts;

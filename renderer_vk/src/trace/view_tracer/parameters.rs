@@ -63,7 +63,7 @@ impl ViewTracer {
             lights: lights.of_view(rec, scene, settings)?,
             transport: transport(rec, traced)?,
             motion: prepared.motion,
-            denoise: (self.denoiser).view(self.frame.wrapping_sub(1), &targets.scratch),
+            denoise: (self.denoiser).view(self.frame.wrapping_sub(1), targets),
             flares: FlareView {
                 flares: flares.flares,
                 states: flares.states,
@@ -74,7 +74,7 @@ impl ViewTracer {
             post: prepared.post,
             antialias: prepared.antialias,
             fog: self.fog.view(&targets.direct[0], &targets.composite),
-            images: image_view(targets),
+            images: self.image_view(targets),
             target: self.target_view(traced),
             camera: camera_view(traced, targets.height),
             // The first view has no predecessor.
@@ -143,6 +143,28 @@ impl ViewTracer {
         set(t::VIEW_HISTORY, self.history.is_some());
         flags
     }
+
+    /// Bindless indices of the images. Where `Targets` lacks one, an image serves that nothing else uses meanwhile; in
+    /// reference mode `other` is not read.
+    fn image_view(&self, targets: &Targets) -> ImageView {
+        let other = (targets.other.as_ref())
+            .or(self.antialias.other())
+            .unwrap_or(&targets.shown);
+        let indirect = (targets.indirect.as_ref())
+            .or(self.denoiser.indirect())
+            .unwrap_or(&targets.direct[0]);
+        ImageView {
+            position: targets.position.storage_index(),
+            surface: targets.surface.storage_index(),
+            shown: targets.shown.storage_index(),
+            other: other.storage_index(),
+            direct: targets.direct[0].storage_index(),
+            indirect: indirect.storage_index(),
+            composite: targets.composite.storage_index(),
+            accumulation: (targets.accumulation.as_ref()).map_or(0, Image::storage_index),
+            motion: targets.motion.storage_index(),
+        }
+    }
 }
 
 /// Geometry and materials.
@@ -169,21 +191,6 @@ fn scene_view(
         sky_distance: traced.scene.view.sky_distance(),
         sun: sun_disc(traced.scene),
     })
-}
-
-/// Bindless indices of the images.
-fn image_view(targets: &Targets) -> ImageView {
-    ImageView {
-        position: targets.position.storage_index(),
-        surface: targets.surface.storage_index(),
-        shown: targets.shown.storage_index(),
-        other: targets.other.storage_index(),
-        direct: targets.direct[0].storage_index(),
-        indirect: targets.indirect.storage_index(),
-        composite: targets.composite.storage_index(),
-        accumulation: (targets.accumulation.as_ref()).map_or(0, Image::storage_index),
-        motion: targets.motion.storage_index(),
-    }
 }
 
 /// The camera of a view that is traced with `height` rows of pixels.
