@@ -93,7 +93,8 @@ pub struct RenderArgs {
     #[arg(long)]
     validate: bool,
     /// Print milliseconds as JSON: of the GPU for each pass (mean over the frames), and of GPU and CPU for a frame
-    /// (median, percentiles, worst); the first frames, at most 10, are apart, and the slowest with the pass that was slow
+    /// (median, percentiles, worst); the first frames, at most 10, are apart, and the slowest with the pass that was
+    /// slow
     #[arg(long)]
     timings: bool,
     /// Write the times of every frame as CSV: milliseconds of GPU, CPU and each pass, and pipelines compiled meanwhile

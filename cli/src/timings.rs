@@ -175,10 +175,10 @@ impl Timings {
         slow
     }
 
-    /// `ms`: mean of each pass over the frames that run it; `gpu_ms` and `cpu_ms`: distribution of the frames' sums, for
-    /// the CPU with the medians of its parts; `draws`: largest number of draw calls in a frame. All without the first
-    /// frames, whose times are in `cold`. `slowest`: the slowest of the others, each with the pass that is farthest above
-    /// its median.
+    /// `ms`: mean of each pass over the frames that run it; `gpu_ms` and `cpu_ms`: distribution of the frames' sums,
+    /// for the CPU with the medians of its parts; `draws`: largest number of draw calls in a frame. All without the
+    /// first frames, whose times are in `cold`. `slowest`: the slowest of the others, each with the pass that is
+    /// farthest above its median.
     pub fn report(&self) -> Map<String, Value> {
         let mean = |times: &[f32]| times.iter().sum::<f32>() / times.len() as f32;
         let passes: Map<_, _> = (self.passes().into_iter())

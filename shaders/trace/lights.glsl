@@ -214,9 +214,10 @@ LightSample sample_triangle(TriangleLight light, vec3 position, vec3 normal, vec
     return s;
 }
 
-// Moves the light along a line to one of 512 points, which are spaced by equal angles as seen from the position (Kulla and
-// Fajardo, Importance Sampling Techniques for Path Tracing in Participating Media, 2012). The first nine bits of `u` select
-// the point; `u` keeps the others. Returns the uniform density of points on the line over the density of the samples.
+// Moves the light along a line to one of 512 points, which are spaced by equal angles as seen from the position (Kulla
+// and Fajardo, Importance Sampling Techniques for Path Tracing in Participating Media, 2012). The first nine bits of
+// `u` select the point; `u` keeps the others. Returns the uniform density of points on the line over the density of the
+// samples.
 float choose_on_line(inout SphereLight light, vec3 position, inout float u) {
     const float POINTS = 512.0;
     vec3 to = light.origin - position;
@@ -322,8 +323,8 @@ struct LightChoice {
     float total; // approximate unshadowed light of all candidates; of resampled choices only
 };
 
-// Selects one light of a set without a parent, each with about the same probability. `u`, here and below: uniform before and after (see
-// `rng_decide`), so that with a second number it samples the point on the light.
+// Selects one light of a set without a parent, each with about the same probability. `u`, here and below: uniform
+// before and after (see `rng_decide`), so that with a second number it samples the point on the light.
 LightChoice sample_uniform(LightSet set, inout float u) {
     uint count = set_count(set), length = uint(findMSB(count));
     if (length > 13) {

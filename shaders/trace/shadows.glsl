@@ -28,8 +28,8 @@ vec3 arriving(LightSample s, vec3 origin, uint mask) {
 }
 
 // Selects the lights of a set one after another, so that the sum of all selected ones, weighted, has the mean of the
-// light of the whole set. Of a swept list, a light of the row that gives an ALL_RAYS-th of its estimated light or more is
-// always selected; of the others each with a probability in proportion to its estimate, by systematic sampling. The
+// light of the whole set. Of a swept list, a light of the row that gives an ALL_RAYS-th of its estimated light or more
+// is always selected; of the others each with a probability in proportion to its estimate, by systematic sampling. The
 // lights that only the parent has are weak in this cell: PARENT_RAYS selections share them.
 struct Enumeration {
     uint next; // members: slots of the row, suns, lights of this frame, then selections from the parent

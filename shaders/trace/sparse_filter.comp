@@ -1,9 +1,9 @@
 #version 460
 // Second pass of the sparse filter: a joint bilateral filter of sixteen taps scattered over a disc, from shared memory.
 // The pattern is rotated from pixel to pixel and frame to frame (Willberger, Musterle, Bergmann, Deferred Hybrid Path
-// Tracing, Ray Tracing Gems, 2019, chapter 26: few scattered taps in place of a dense kernel). The inner taps alone make
-// the history of the next frame, so that a history of many frames is blurred little. It keeps no variance: the number of
-// accumulated frames estimates the noise.
+// Tracing, Ray Tracing Gems, 2019, chapter 26: few scattered taps in place of a dense kernel). The inner taps alone
+// make the history of the next frame, so that a history of many frames is blurred little. It keeps no variance: the
+// number of accumulated frames estimates the noise.
 #include "trace/sparse_filter.glsl"
 
 const int GROUP = 16, RADIUS = 7, ACROSS = GROUP + 2 * RADIUS;
@@ -12,9 +12,9 @@ layout(local_size_x = GROUP, local_size_y = GROUP) in;
 const int TAPS = 16, INNER_TAPS = 5;
 const float LOG2_E = 1.44269504;
 
-// Light, normal and signed inverse depth of the work group's texels and those around, as 16-bit floats: inverse depth is
-// negative for reflections that alternate with refraction, 0 without a surface. 14,400 of the 16,384 bytes that every
-// device has.
+// Light, normal and signed inverse depth of the work group's texels and those around, as 16-bit floats: inverse depth
+// is negative for reflections that alternate with refraction, 0 without a surface. 14,400 of the 16,384 bytes that
+// every device has.
 shared uvec4 texels[ACROSS * ACROSS];
 
 struct Tap {

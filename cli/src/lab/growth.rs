@@ -29,8 +29,9 @@ use crate::view::{draw, load};
 /// Measure how the cost of a frame grows: with pixels, lights, triangles, entities, curves, layers, mirrors
 ///
 /// Draws made-up scenes in the traced look, each larger in one respect, and writes milliseconds by pass and bytes by
-/// purpose: growth.json, growth.csv, growth.html with curves, and a picture of the largest size. For each axis it prints the power law through the
-/// times, the pass with most of the time at the largest size, and the pass with most of the increase.
+/// purpose: growth.json, growth.csv, growth.html with curves, and a picture of the largest size. For each axis it
+/// prints the power law through the times, the pass with most of the time at the largest size, and the pass with most
+/// of the increase.
 ///
 /// Examples: relight-lab growth -o out/growth; relight-lab growth -o out --axis lights=1,100,10000 --axis layers
 #[derive(Args, Debug)]

@@ -306,8 +306,8 @@ impl Renderer {
         Ok(Picture { width, height, rgb })
     }
 
-    /// The image that the window would show, for a window of more than white: linear light in units of 80 cd/m² (scRGB),
-    /// or the code values of HDR10, 0 to 1. RGB in rows from the top; empty with 8 bits a channel.
+    /// The image that the window would show, for a window of more than white: linear light in units of 80 cd/m²
+    /// (scRGB), or the code values of HDR10, 0 to 1. RGB in rows from the top; empty with 8 bits a channel.
     ///
     /// # Errors
     /// The device is lost or out of memory.

@@ -198,8 +198,8 @@ impl Antialias {
         })
     }
 
-    /// An image as `Targets::other`, which nothing else uses before the picture is resolved; `None` if the traced picture
-    /// is shown unchanged.
+    /// An image as `Targets::other`, which nothing else uses before the picture is resolved; `None` if the traced
+    /// picture is shown unchanged.
     pub fn other(&self) -> Option<&Image> {
         self.resolved.as_ref().map(|[now, _]| &now.other)
     }

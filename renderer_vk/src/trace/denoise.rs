@@ -10,8 +10,8 @@
 //!    guided by the variance, remove the remaining noise. The result of the first step is the history of the next
 //!    frame; the last step writes the filtered light into the image of direct light.
 //!
-//! `rt_denoiser 2` costs about a quarter: a running mean over frames, which a change of the light shortens, and one pass
-//! of few scattered taps.
+//! `rt_denoiser 2` costs about a quarter: a running mean over frames, which a change of the light shortens, and one
+//! pass of few scattered taps.
 
 use shaders::trace_types::DenoiseView;
 use shaders::trace_types::constants as t;
@@ -185,8 +185,8 @@ impl Denoiser {
             .filter(|i| wanted && i.tier == Tier::Adaptive)
     }
 
-    /// Parameters of the passes. `last_seed`: random seed of the last frame; `targets`: images of the view, whose scratch
-    /// memory holds gradients, then light that is being filtered.
+    /// Parameters of the passes. `last_seed`: random seed of the last frame; `targets`: images of the view, whose
+    /// scratch memory holds gradients, then light that is being filtered.
     pub fn view(&self, last_seed: u32, targets: &Targets) -> DenoiseView {
         let nothing = self.nothing.storage_index();
         let empty = DenoiseView {

@@ -1,8 +1,8 @@
 //! Cells: subdivisions of clusters, each with its own light list.
 //!
 //! The contribution of a light varies within a large cluster: selection probabilities that fit one end do not fit the
-//! other. Leafs of the map's tree are therefore split along a grid, as fine as the time to estimate the lists allows, and the
-//! tree that shaders walk is extended to the pieces: a few more steps of a walk reach a better list.
+//! other. Leafs of the map's tree are therefore split along a grid, as fine as the time to estimate the lists allows,
+//! and the tree that shaders walk is extended to the pieces: a few more steps of a walk reach a better list.
 
 use std::collections::HashMap;
 

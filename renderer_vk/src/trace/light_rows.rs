@@ -1,9 +1,9 @@
 //! Light lists as shaders read them: for each cell one row per normal bin.
 //!
 //! The lists that cells want ([`light_lists`](super::light_lists)) are as long as their cluster's, and most of their
-//! entries say nearly the same. A row therefore states only the lights whose probability differs most from the mean over
-//! its cluster, and takes the others from the row of the cluster. Every light keeps a probability above 0, so that the
-//! estimate stays unbiased; the number of own lights follows from the variance that the difference would cost.
+//! entries say nearly the same. A row therefore states only the lights whose probability differs most from the mean
+//! over its cluster, and takes the others from the row of the cluster. Every light keeps a probability above 0, so that
+//! the estimate stays unbiased; the number of own lights follows from the variance that the difference would cost.
 
 use shaders::trace_types as t;
 use shaders::trace_types::constants as c;
@@ -59,8 +59,8 @@ impl Slots {
         self.row(first, c::NO_PARENT, place)
     }
 
-    /// Adds those of a row for some lights of a list. `parent`: the row with the others; `of_parent`: its probability of
-    /// each light in `list`.
+    /// Adds those of a row for some lights of a list. `parent`: the row with the others; `of_parent`: its probability
+    /// of each light in `list`.
     fn add_part(
         &mut self,
         list: &[Entry],

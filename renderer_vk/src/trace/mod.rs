@@ -37,6 +37,7 @@ pub mod light_weights;
 pub mod lights;
 pub mod look;
 pub mod motion;
+mod nearby;
 mod part_mesh;
 mod parts;
 pub mod pass_set;

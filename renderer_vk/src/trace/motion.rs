@@ -18,6 +18,7 @@ use shaders::trace_types::{LastInstance, MotionView, PortalRecord};
 use shaders::types::{Instance, Vertex};
 use support::slice::{self, item};
 
+use super::nearby::Nearby;
 use super::targets::Targets;
 use crate::api::{EntityKind, renderfx};
 use crate::gpu::{Error, Recorder};
@@ -184,35 +185,30 @@ fn last_instance(now: &Instance, (axis, origin): ([Vec3; 3], Vec3)) -> LastInsta
 impl Past {
     /// For each entity, the index of its match in the last frame.
     fn match_entities(&self, entities: &[ViewEntity], passed: f32) -> Vec<Option<usize>> {
-        let mut alike: HashMap<Sort, Vec<usize>> = HashMap::new();
-        for (index, entity) in self.entities.iter().enumerate() {
-            alike.entry(Sort::of(entity)).or_default().push(index);
-        }
         // a restarted game resets its clock
         let passed = if passed >= 0.0 { passed } else { 0.0 };
         let reach = SLACK + FASTEST * passed;
         let ahead = if passed <= TRUSTED_TIME { passed } else { 0.0 };
+        let expected =
+            |index: usize, last: &ViewEntity| last.origin + item(&self.velocities, index) * ahead;
+        let mut alike: HashMap<Sort, Nearby> = HashMap::new();
+        for (index, entity) in self.entities.iter().enumerate() {
+            let alike = alike.entry(Sort::of(entity)).or_default();
+            alike.add(index, expected(index, entity));
+        }
         let match_one = |entity: &ViewEntity| {
             let candidates = alike.get_mut(&Sort::of(entity))?;
-            let cost = |&index: &usize| {
+            // Of two entities at one position each is matched with itself.
+            candidates.take(entity.origin, |index| {
                 let last = self.entities.get(index)?;
-                let velocity = item(&self.velocities, index);
                 if entity.origin.distance(last.origin) > reach {
                     return None;
                 }
-                let expected = last.origin + velocity * ahead;
                 let follows = [last.frame, last.old_frame].contains(&entity.old_frame)
                     || entity.frame == last.frame;
                 let strange = if follows { 0.0 } else { STRANGE_FRAME * reach };
-                Some(entity.origin.distance(expected) + strange)
-            };
-            let best = candidates
-                .iter()
-                .enumerate()
-                .filter_map(|(place, index)| Some((place, cost(index)?)))
-                .min_by(|a, b| a.1.total_cmp(&b.1))?;
-            // keeps the order, so that of two entities at one position each is matched with itself
-            Some(candidates.remove(best.0))
+                Some(entity.origin.distance(expected(index, last)) + strange)
+            })
         };
         entities.iter().map(match_one).collect()
     }

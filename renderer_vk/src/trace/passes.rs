@@ -216,7 +216,8 @@ passes! {
         reads: &[Scene, PrimaryHits],
         writes: &[GBuffer, Normals, Shown, FogPoints],
     }
-    /// The surface that each other pixel shows behind mirrors, portals, glass and liquids, with the layers in front of it.
+    /// The surface that each other pixel shows behind mirrors, portals, glass and liquids, with the layers in front of
+    /// it.
     Primary = "trace_primary", Rays(&shaders::TRACE_PRIMARY), Traced {
         switch: Some((ids::fog_keep::LIT_FOG, LitFog)),
         reads: &[Scene, PrimaryHits],

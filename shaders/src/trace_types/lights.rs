@@ -17,8 +17,8 @@ pub struct TriangleLight {
     pub end: f32,
 }
 
-/// A small emitting sphere: a point light of the map or a dynamic light of the game; or a capsule, the mean of the spheres
-/// along a line.
+/// A small emitting sphere: a point light of the map or a dynamic light of the game; or a capsule, the mean of the
+/// spheres along a line.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct SphereLight {
@@ -90,8 +90,8 @@ pub struct LightSlot {
     pub fractions: u32,
 }
 
-/// Light list of a cell for one normal bin, or of a cluster: slots from `first` on. A row with a parent holds the lights
-/// whose probability differs most from the parent's; one of `PARENT_DRAWS` draws is from the parent.
+/// Light list of a cell for one normal bin, or of a cluster: slots from `first` on. A row with a parent holds the
+/// lights whose probability differs most from the parent's; one of `PARENT_DRAWS` draws is from the parent.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct LightRow {

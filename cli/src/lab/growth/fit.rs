@@ -5,7 +5,8 @@ use serde::Serialize;
 /// Exponents that are tried: from the first to the last, in steps of the third.
 const EXPONENTS: (f64, f64, f64) = (0.1, 3.0, 0.01);
 
-/// Least increase of a cost, over the cost of the smallest size, to which an exponent is fitted; below, timer noise decides.
+/// Least increase of a cost, over the cost of the smallest size, to which an exponent is fitted; below, timer noise
+/// decides.
 const LEAST_INCREASE: f64 = 0.1;
 
 /// `base + factor · size^exponent`.

@@ -275,7 +275,8 @@ fn crowd() -> Scene {
     scene
 }
 
-/// The same in a map whose one cluster is cut into cells; rays have measured, not exactly, how much of each light arrives.
+/// The same in a map whose one cluster is cut into cells; rays have measured, not exactly, how much of each light
+/// arrives.
 fn crowd_in_cells() -> Scene {
     let mut scene = crowd();
     let mut map = q3bsp::builder::MapBuilder::new();
@@ -297,9 +298,9 @@ fn crowd_in_cells() -> Scene {
     scene
 }
 
-/// If pixels are independent and unbiased, their differences have mean zero: then the sum of differences over the root of
-/// the sum of their squares is normally distributed with a deviation of one, in the picture and in each square of it.
-/// Four and a half deviations happen in one picture of some hundred thousand.
+/// If pixels are independent and unbiased, their differences have mean zero: then the sum of differences over the root
+/// of the sum of their squares is normally distributed with a deviation of one, in the picture and in each square of
+/// it. Four and a half deviations happen in one picture of some hundred thousand.
 fn differs_by_noise_alone(pixels: &[Vec3], truth: &[Vec3], what: &str) {
     const BOUND: f32 = 4.5;
     let score = |chosen: &dyn Fn(usize) -> bool| {
