@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 """Quality of clips as people see it: ColorVideoVDP's JOD of each clip that `relight-lab measure --clips DIR` wrote.
 
-    python3 -m venv jod && jod/bin/pip install cvvdp
+    python3 -m venv jod && jod/bin/pip install cvvdp 'torch==2.0.1' 'torchvision==0.15.2' 'numpy<2'
     jod/bin/python lab/jod.py DIR [-o jod.json] [--display standard_fhd]
 
 JOD: just-objectionable differences, 10 for equal videos; one JOD less is noticed by 75 % of people (Mantiuk et al.,
 "ColorVideoVDP", ACM Transactions on Graphics 43, 2024). The value depends on the display and the distance, which
 --display selects by name; `cvvdp --display ?` lists the names. A clip is compared with its folder `reference`, frame by frame
-at the rate of its clip.json.
+at the rate of its clip.json. The versions are those that it was tried with, on Python 3.11 and cvvdp 0.5.7.
 
 Prints a row for each clip and picture and the mean of each picture, and writes them as JSON.
 """

@@ -1,4 +1,4 @@
-//! `relight-lab growth`: cost of a frame of the traced look over the size of what it shows, in made-up scenes.
+//! `relight-lab growth`: cost of a traced frame as one property of a generated scene grows.
 //!
 //! One hall, in which one thing at a time grows. Lights are those of the directives, frames are drawn as in a game,
 //! with a camera at rest. Times are medians by GPU timers, without the first frames.
@@ -46,7 +46,7 @@ pub struct GrowthArgs {
     /// Size in pixels
     #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1280x720", value_parser = parse_size)]
     size: (u32, u32),
-    /// Frames of a scene, of which the first 10, at most half, are not in the medians
+    /// Frames of a scene; the medians leave out the first 10, or half of them if there are fewer than 20
     #[arg(long, value_name = "N", default_value_t = 74, value_parser = clap::value_parser!(u32).range(2..))]
     frames: u32,
     /// Vulkan device: part of its name

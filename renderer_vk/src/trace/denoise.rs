@@ -10,7 +10,7 @@
 //!    guided by the variance, remove the remaining noise. The result of the first step is the history of the next
 //!    frame; the last step writes the filtered light into the image of direct light.
 //!
-//! `rt_denoiser 2` costs about a quarter: a running mean over frames, which a change of the light shortens, and one
+//! `rt_denoiser 2` takes about 60 % of the time: a running mean over frames, which a change of the light shortens, and one
 //! pass of few scattered taps.
 
 use shaders::trace_types::DenoiseView;

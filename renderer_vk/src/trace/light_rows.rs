@@ -406,10 +406,11 @@ pub fn rows(
 #[cfg(test)]
 mod tests {
     use super::super::light_cells::Cells;
+    use super::super::light_weights::tests::lamp;
     use super::*;
     use glam::Vec3;
     use q3bsp::builder::MapBuilder;
-    use relight::light::{EmissionSource, LightLists, LightShare, TriangleLight};
+    use relight::light::{LightLists, LightShare, TriangleLight};
 
     /// A hall with lamps below its ceiling, in `clusters` clusters side by side, whose lists all have all lamps.
     struct Hall {
@@ -429,22 +430,13 @@ mod tests {
                 map.add_quad(stone, corners.map(|p| at + p * 300.0));
             }
             let width = 300.0 * clusters as f32;
-            let lamp = |i: usize| {
+            let lamp_number = |i: usize| {
                 let at = Vec3::new(
                     (i as f32 * 0.618_034).fract() * width,
                     (i as f32 * 0.414_214).fract() * 300.0,
                     190.0,
                 );
-                TriangleLight {
-                    vertices: [at, at + Vec3::Y * 4.0, at + Vec3::X * 4.0],
-                    radiance: Vec3::splat(1.0 + (i % 7) as f32),
-                    two_sided: false,
-                    surface: 0,
-                    triangle: 0,
-                    model: 0,
-                    is_sky: false,
-                    source: EmissionSource::SurfaceLight,
-                }
+                lamp(at, Vec3::NEG_Z, 1.0 + (i % 7) as f32)
             };
             let rows = clusters + 1;
             let all: Vec<u32> = (0..count(lamps)).collect();
@@ -454,7 +446,7 @@ mod tests {
             };
             Self {
                 bsp: map.build(),
-                lamps: (0..lamps).map(lamp).collect(),
+                lamps: (0..lamps).map(lamp_number).collect(),
                 lists: LightLists {
                     offsets: (0..=rows).map(|row| count(row * lamps)).collect(),
                     lights: all.repeat(rows),

@@ -301,7 +301,7 @@ pub fn shares(
 #[cfg(test)]
 mod target_test;
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::lights::{triangle_bounds, triangle_light};
     use super::*;
     use q3bsp::builder::MapBuilder;
@@ -309,7 +309,7 @@ mod tests {
     use relight::{Materials, MemoryFiles, Options, RelitWorld};
     use testkit::Random;
 
-    pub(super) fn lamp(at: Vec3, towards: Vec3, radiance: f32) -> TriangleLight {
+    pub fn lamp(at: Vec3, towards: Vec3, radiance: f32) -> TriangleLight {
         let (x, y) = towards.normalize().any_orthonormal_pair();
         let mut vertices = [at + x * 4.0, at + y * 4.0, at - (x + y) * 4.0];
         let [a, b, c] = vertices;

@@ -62,7 +62,7 @@ impl PowerLaw {
             true => ((w * pp - p * wp) / divisor, (p * ww - w * wp) / divisor),
             false => (w / ww, 0.0),
         };
-        // on the border of what is allowed, one of them is 0
+        // at the bound of the constraint one of the two is 0
         let (base, factor) = match (base < 0.0, factor < 0.0) {
             (true, _) => (0.0, if pp > 0.0 { p / pp } else { 0.0 }),
             (_, true) => (w / ww, 0.0),

@@ -17,7 +17,7 @@ use crate::view::Camera;
 /// Frames in a second.
 const RATE: f32 = 1000.0 / FRAME_TIME as f32;
 
-/// Directions of which the camera walks along the one with the longest way.
+/// Number of directions that are tried; the camera walks along the one with the longest open way.
 const DIRECTIONS: u8 = 16;
 
 /// Distance that the camera keeps to the end of its way, and of points that are tested, units.
