@@ -349,6 +349,7 @@ unsafe extern "C" fn gfx_info() {
                     "N/A".into()
                 }
             ),
+            format!("LATENCY: {}", renderer.latency_method()),
             format!(
                 "GAMMA: {} w/ {} overbright bits",
                 if settings.ignore_hw_gamma {

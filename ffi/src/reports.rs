@@ -30,6 +30,7 @@ pub fn zip(
         format!("engine: {version}, tables of {name}"),
         format!("map: {map}, fs_game \"{game}\""),
         format!("window: {}x{}", front.size.0, front.size.1),
+        format!("r_lowLatency: {}", renderer.latency_method()),
     ];
     let report = Report {
         about,

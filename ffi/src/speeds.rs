@@ -10,10 +10,14 @@ pub fn lines(settings: &Settings, stats: &FrameStats, renderer: &Renderer) -> Ve
     }
     if settings.rt {
         let gpu: f32 = renderer.timings().iter().map(|(_, ms)| ms).sum();
-        return vec![format!(
+        let mut line = format!(
             "{} views, {} draws; {gpu:.2} ms on the GPU in an earlier frame",
             stats.views, stats.draws
-        )];
+        );
+        if let Some((to, ms)) = renderer.newest_latency() {
+            line += &format!("; one {to} {ms:.1} ms after input");
+        }
+        return vec![line];
     }
     classic(settings.speeds, stats)
 }

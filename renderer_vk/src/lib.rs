@@ -12,6 +12,7 @@ mod error;
 mod frame;
 mod gpu;
 mod half;
+mod pacing;
 pub mod path;
 pub mod picture_files;
 mod raster;
@@ -40,6 +41,6 @@ pub use settings::{
     Anaglyph, DebugOutput, DenoiserChoice, HdrChoice, LightSelection, MapLightChoice, ModelShadows,
     Settings, TextureMode, TracerChoice,
 };
-pub use statistics::{Costs, MemoryPurpose, PassCost, Spread};
+pub use statistics::{Costs, Latency, MemoryPurpose, PassCost, Spread};
 pub use stereo::Eye;
 pub use world::LightsChanged;

@@ -3,6 +3,7 @@
 mod held;
 mod kept_pipelines;
 mod output;
+mod pace;
 mod pictures;
 mod queries;
 mod registration;
@@ -21,6 +22,7 @@ use crate::gpu::{
     ColorMask, Device, DeviceInfo, DeviceOptions, Encoding, FrameRing, SurfaceSource, Swapchain,
     SwapchainDesc, Window, give_back_freed_memory,
 };
+use crate::pacing::Pacer;
 use crate::raster::{DrawList, Flares, Overlay, Present, Raster, UiTextures};
 use crate::scene::{GatherInput, Scene};
 use crate::settings::{Anaglyph, HdrChoice, Settings};
@@ -124,6 +126,11 @@ pub struct Renderer {
     calibrations: Option<relight::CalibrationCache>,
     /// The window is minimised.
     hidden: bool,
+    pacer: Pacer,
+    /// Frames end when the display shows them; otherwise, when they are drawn.
+    paced_by_display: bool,
+    /// A frame was waited for in vain.
+    display_sleeps: bool,
     hides_overlay: bool,
 }
 
@@ -234,6 +241,9 @@ impl Renderer {
             entity_tokens: EntityTokens::default(),
             calibrations: None,
             hidden: false,
+            pacer: Pacer::default(),
+            paced_by_display: false,
+            display_sleeps: false,
             hides_overlay: false,
         })
     }
@@ -354,6 +364,7 @@ impl Renderer {
     /// drawn.
     pub fn render_scene(&mut self, def: &RefDef) -> Result<(), Error> {
         let wants_world = def.flags & rdflags::NO_WORLD_MODEL == 0;
+        self.look_for_ends()?;
         if self.settings.no_refresh {
             self.scene.clear();
             return Ok(());

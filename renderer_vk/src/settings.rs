@@ -10,8 +10,8 @@ mod value;
 use std::hash::Hasher;
 
 pub use choices::{
-    Anaglyph, DebugOutput, DenoiserChoice, HdrChoice, LightSelection, MapLightChoice, ModelShadows,
-    TextureMode, TracerChoice,
+    Anaglyph, DebugOutput, DenoiserChoice, HdrChoice, LightSelection, LowLatency, MapLightChoice,
+    ModelShadows, TextureMode, TracerChoice,
 };
 pub use presets::{PRESETS, Preset};
 use row::written_back;
@@ -155,6 +155,7 @@ settings! { variables {
     show_cluster: i32 = "r_showcluster", "0", CHEAT, None, Frame, GoesOn, "1 prints the cluster and area of the camera when they change.";
     // settings of this renderer
     rt: bool = "r_rt", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 traces light with rays, 0 draws the classic look. Switches at once.";
+    low_latency: LowLatency = "r_lowLatency", "2", ARCHIVE, kept(0.0, 2.0), Frame, GoesOn, "Time from input to picture: 0 lets two frames wait for the GPU and the display, 1 one; 2 also keeps the engine until the GPU is about to need its next frame.";
     rt_tracer: TracerChoice = "rt_tracer", "auto", ARCHIVE | LATCH, None, Start, GoesOn, "What follows the rays: auto, pipeline, query or compute. A device without it gets what auto picks.";
     rt_lights: MapLightChoice = "rt_lights", "calibrated", ARCHIVE, None, With("rt_lights"), Restarts, "Lights of the map: calibrated, fitted to the light that its compiler stored, or prior, as its directives say. Switches at once.";
     rt_print_perf_stats: bool = "rt_printPerfStats", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 prints times, rays and memory of the traced look each second.";

@@ -111,6 +111,36 @@ pub struct Costs {
     pub memory: Vec<(MemoryPurpose, u64)>,
     /// Bytes allocated from the driver.
     pub reserved: u64,
+    /// From input to picture, in a window.
+    pub latency: Option<Latency>,
+}
+
+/// Times from input to picture of the newest frames, milliseconds. The engine reads input after a frame's end and
+/// before the next frame's first call: the true times lie between both. An end that no one waited for is noted late, by
+/// at most the part of a frame's work between two looks.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Latency {
+    /// `shown`, on the display (`VK_KHR_present_wait`), or `drawn`, by the GPU.
+    pub to: &'static str,
+    /// Number of frames.
+    pub frames: usize,
+    /// From the end of the frame before.
+    pub from_end: Spread,
+    /// From the frame's first call.
+    pub from_begin: Spread,
+}
+
+impl Latency {
+    fn line(&self) -> String {
+        let of = |spread: &Spread| format!("{:.1} ms, 99 of 100 {:.1}", spread.median, spread.p99);
+        format!(
+            "from input until {}, {} frames: median {} from the end of the frame before, {} from the first call",
+            self.to,
+            self.frames,
+            of(&self.from_end),
+            of(&self.from_begin)
+        )
+    }
 }
 
 impl Costs {
@@ -174,6 +204,7 @@ impl Costs {
             "{:9.1} MB  taken from the driver",
             megabytes(self.reserved)
         ));
+        lines.extend(self.latency.iter().map(Latency::line));
         lines
     }
 
@@ -198,6 +229,14 @@ impl Costs {
         }
         let held = self.memory.iter().map(|(_, bytes)| bytes).sum();
         let _ = write!(line, "; {:.0} MB", megabytes(held));
+        if let Some(latency) = &self.latency {
+            let (to, from) = (latency.to, latency.from_end);
+            let _ = write!(
+                line,
+                "; {to} after {:.1} ms, 99 of 100 {:.1}",
+                from.median, from.p99
+            );
+        }
         line
     }
 
@@ -211,6 +250,7 @@ impl Costs {
             passes: self.passes.iter().map(PassReport::of).collect(),
             total: PassReport::of(&self.total()),
             memory: self,
+            latency: self.latency,
         };
         // No value in a report fails to serialize.
         serde_json::to_string_pretty(&report).unwrap_or_default() + "\n"
@@ -228,6 +268,7 @@ struct Report<'a> {
     total: PassReport,
     #[serde(serialize_with = "memory_by_name")]
     memory: &'a Costs,
+    latency: Option<Latency>,
 }
 
 /// [`PassCost`] as JSON; a number that is not finite becomes `null`.
@@ -289,6 +330,7 @@ mod tests {
                 held(MemoryKind::Texture, "a sky light", 40),
             ]),
             reserved: 1 << 20,
+            latency: None,
         }
     }
 

@@ -99,6 +99,7 @@ pub(crate) struct DeviceInner {
     pub acceleration: Option<khr::acceleration_structure::Device>,
     pub ray_tracing: Option<khr::ray_tracing_pipeline::Device>,
     pub swapchain: Option<khr::swapchain::Device>,
+    pub present_wait: Option<khr::present_wait::Device>,
     pub dynamic_state: Option<DynamicStateCommands>,
     pub debug: Option<ext::debug_utils::Device>,
     pub core: RawDevice,
@@ -180,6 +181,9 @@ impl Device {
                 .surface
                 .is_some()
                 .then(|| khr::swapchain::Device::new(vi, vd)),
+            present_wait: a
+                .present_wait
+                .then(|| khr::present_wait::Device::new(vi, vd)),
             dynamic_state: a.dynamic_state.then(|| DynamicStateCommands::new(vi, vd)),
             debug: select::debug_utils(&core.instance, vd),
             info: choice.info,

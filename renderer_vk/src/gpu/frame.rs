@@ -1,5 +1,7 @@
 //! The ring of frames in flight: the CPU records one while the GPU executes another.
 
+use std::time::Duration;
+
 use ash::vk;
 
 use super::device::{Device, lock};
@@ -119,6 +121,30 @@ impl FrameRing {
             recording: Some(Recording(device.clone())),
             device,
         })
+    }
+
+    /// The newest submission.
+    pub fn newest(&self) -> u64 {
+        lock(&self.device.0.state).submitted
+    }
+
+    /// Waits until the GPU has finished a submission, as [`newest`](Self::newest) counts them, and all before it; at most
+    /// `timeout`. `false`: it has not.
+    ///
+    /// # Errors
+    /// Out of memory, device loss.
+    pub fn wait(&self, submission: u64, timeout: Duration) -> Result<bool, Error> {
+        let (semaphores, values) = ([self.device.0.timeline], [submission.min(self.newest())]);
+        let info = vk::SemaphoreWaitInfo::default()
+            .semaphores(&semaphores)
+            .values(&values);
+        let nanoseconds = u64::try_from(timeout.as_nanos()).unwrap_or(u64::MAX);
+        // SAFETY: the value is 0 or was submitted.
+        match unsafe { self.device.vk().wait_semaphores(&info, nanoseconds) } {
+            Ok(()) => Ok(true),
+            Err(vk::Result::TIMEOUT) => Ok(false),
+            Err(result) => Err(result).context("vkWaitSemaphores"),
+        }
     }
 
     /// Submits a frame without presenting.

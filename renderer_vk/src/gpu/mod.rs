@@ -69,7 +69,7 @@ pub use pipeline_cache::is_pipeline_cache;
 pub use ray_tracing::{HitGroup, RayTracingDesc, RayTracingPipeline};
 pub use recorder::Recorder;
 pub use select::{DeviceInfo, DeviceKind, RayTracingLimits};
-pub use swapchain::{Swapchain, SwapchainDesc};
+pub use swapchain::{Presented, Swapchain, SwapchainDesc};
 pub use tlas::{Instance, Tlas};
 pub use window::{CreateSurface, Window};
 pub use window_format::Encoding;

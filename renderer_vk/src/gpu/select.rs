@@ -68,6 +68,8 @@ pub struct DeviceInfo {
     pub anisotropy: Option<f32>,
     /// Whether triangles can be drawn as lines.
     pub wireframe: bool,
+    /// Whether the window system says when a picture is shown (`VK_KHR_present_wait`).
+    pub present_wait: bool,
     /// Whether BC1 to BC7 textures can be sampled.
     pub bc: bool,
     /// 16-bit floats in arithmetic and storage.
@@ -94,6 +96,7 @@ pub(crate) struct Abilities {
     pub query: bool,
     pub anisotropy: bool,
     pub wireframe: bool,
+    pub present_wait: bool,
     pub bc: bool,
     pub extended_formats: bool,
     pub fragment_stores: bool,
@@ -164,6 +167,10 @@ pub(crate) fn create_device(instance: &Instance, choice: &Choice) -> Result<ash:
     if instance.surface.is_some() {
         extensions.push(khr::swapchain::NAME.as_ptr());
     }
+    if a.present_wait {
+        extensions.push(khr::present_id::NAME.as_ptr());
+        extensions.push(khr::present_wait::NAME.as_ptr());
+    }
     if a.acceleration {
         extensions.push(khr::acceleration_structure::NAME.as_ptr());
         extensions.push(khr::deferred_host_operations::NAME.as_ptr());
@@ -218,6 +225,8 @@ pub(crate) fn create_device(instance: &Instance, choice: &Choice) -> Result<ash:
     let mut f_dynamic3 = vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT::default()
         .extended_dynamic_state3_color_blend_enable(true)
         .extended_dynamic_state3_color_blend_equation(true);
+    let mut f_id = vk::PhysicalDevicePresentIdFeaturesKHR::default().present_id(true);
+    let mut f_wait = vk::PhysicalDevicePresentWaitFeaturesKHR::default().present_wait(true);
     let priorities = [1.0];
     let queues = [vk::DeviceQueueCreateInfo::default()
         .queue_family_index(choice.queue_family)
@@ -228,6 +237,9 @@ pub(crate) fn create_device(instance: &Instance, choice: &Choice) -> Result<ash:
         .enabled_features(&features)
         .push_next(&mut f11)
         .push_next(&mut f12);
+    if a.present_wait {
+        info = info.push_next(&mut f_id).push_next(&mut f_wait);
+    }
     if a.acceleration {
         info = info.push_next(&mut f_accel);
     }

@@ -1,5 +1,7 @@
 //! The swapchain of the window.
 
+use std::time::Duration;
+
 use ash::vk;
 use support::slice;
 
@@ -73,6 +75,17 @@ fn composite_alpha(caps: &vk::SurfaceCapabilitiesKHR) -> vk::CompositeAlphaFlags
     .unwrap_or(vk::CompositeAlphaFlagsKHR::OPAQUE)
 }
 
+/// What is known of a presentation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Presented {
+    /// It is on the display, or was.
+    Shown,
+    /// It is not, at the end of the time to wait.
+    NotYet,
+    /// It will not be known: of an earlier swapchain, or out of date.
+    Unknown,
+}
+
 /// The images of the window, recreated when the window changes.
 pub struct Swapchain {
     device: Device,
@@ -81,6 +94,8 @@ pub struct Swapchain {
     format: WindowFormat,
     images: Vec<(Image, vk::Semaphore)>,
     stale: bool,
+    /// Presenting waits for vertical blank.
+    synchronized: bool,
     /// Images can be targets of copies.
     copies: bool,
     /// Semaphore of an acquired image whose frame is not submitted yet.
@@ -89,6 +104,10 @@ pub struct Swapchain {
     put_off: Option<Submitted>,
     /// Presentation is deferred; see [`Swapchain::new`].
     late: bool,
+    /// Number of images submitted so far: the number of the newest one's presentation.
+    number: u64,
+    /// Number of the first presentation that can be waited for: earlier ones belong to an earlier swapchain, or failed.
+    first: u64,
 }
 
 /// The image of a submitted frame.
@@ -115,10 +134,13 @@ impl Swapchain {
             format: WindowFormat::default(),
             images: Vec::new(),
             stale: true,
+            synchronized: false,
             copies: false,
             acquired: None,
             put_off: None,
             late: false,
+            number: 0,
+            first: 1,
         };
         swapchain.format = swapchain.choose_format()?;
         swapchain.recreate()?;
@@ -243,6 +265,7 @@ impl Swapchain {
     /// Presents the image of a submitted frame, deferred or at once.
     pub(crate) fn submitted(&mut self, image: Submitted) -> Result<(), Error> {
         self.acquired = None;
+        self.number += 1;
         self.put_off = Some(image);
         if self.late { Ok(()) } else { self.show() }
     }
@@ -257,19 +280,74 @@ impl Swapchain {
             return Ok(());
         };
         let (waits, swapchains, indices) = ([image.finished], [self.raw], [image.index]);
-        let info = vk::PresentInfoKHR::default()
+        let numbers = [self.number];
+        let mut number = vk::PresentIdKHR::default().present_ids(&numbers);
+        let mut info = vk::PresentInfoKHR::default()
             .wait_semaphores(&waits)
             .swapchains(&swapchains)
             .image_indices(&indices);
+        if self.device.0.present_wait.is_some() {
+            info = info.push_next(&mut number);
+        }
         let queue = lock(&self.device.0.queue);
         // SAFETY: the image was acquired from this swapchain, the frame that signals the semaphore was submitted, the
         // queue is held.
         match unsafe { functions.queue_present(*queue, &info) } {
             Ok(suboptimal) => self.stale |= suboptimal,
-            Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => self.stale = true,
+            Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => {
+                self.stale = true;
+                // it is never shown
+                self.first = self.number + 1;
+            }
             Err(result) => return Err(result).context("vkQueuePresentKHR"),
         }
         Ok(())
+    }
+
+    /// Number of the newest image's presentation; 0: there was none.
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// Whether [`wait_presented`](Self::wait_presented) can be called, and presenting waits for the display: without
+    /// vertical synchronization a picture is shown once it is drawn, and window systems differ in what they report.
+    pub fn reports(&self) -> bool {
+        self.device.0.present_wait.is_some() && self.synchronized
+    }
+
+    /// Waits until the presentation of this number, or a later one, is on the display; at most `timeout`.
+    ///
+    /// # Errors
+    /// Out of memory, a lost surface, device loss.
+    pub fn wait_presented(&mut self, number: u64, timeout: Duration) -> Result<Presented, Error> {
+        let Some(functions) = &self.device.0.present_wait else {
+            return Ok(Presented::Unknown);
+        };
+        if number < self.first || number > self.number || self.raw == vk::SwapchainKHR::null() {
+            return Ok(Presented::Unknown);
+        }
+        if number == self.number && self.put_off.is_some() {
+            return Ok(Presented::NotYet);
+        }
+        let nanoseconds = u64::try_from(timeout.as_nanos()).unwrap_or(u64::MAX);
+        // SAFETY: the extension and its feature are on; presentations of this swapchain have ascending numbers; `self`
+        // is borrowed, so that nothing else uses the swapchain.
+        match unsafe { functions.wait_for_present(self.raw, number, nanoseconds) } {
+            Ok(()) => Ok(Presented::Shown),
+            Err(vk::Result::SUBOPTIMAL_KHR) => {
+                self.stale = true;
+                Ok(Presented::Shown)
+            }
+            Err(vk::Result::TIMEOUT) => Ok(Presented::NotYet),
+            Err(
+                vk::Result::ERROR_OUT_OF_DATE_KHR
+                | vk::Result::ERROR_FULL_SCREEN_EXCLUSIVE_MODE_LOST_EXT,
+            ) => {
+                self.stale = true;
+                Ok(Presented::Unknown)
+            }
+            Err(result) => Err(result).context("vkWaitForPresentKHR"),
+        }
     }
 
     fn change_layout(
@@ -358,6 +436,8 @@ impl Swapchain {
             return Ok(());
         }
         let count = image_count(&caps);
+        let mode = self.desc.present_mode(&modes);
+        self.synchronized = mode == vk::PresentModeKHR::FIFO;
         let usage = (vk::ImageUsageFlags::COLOR_ATTACHMENT
             | vk::ImageUsageFlags::TRANSFER_DST
             | vk::ImageUsageFlags::TRANSFER_SRC)
@@ -375,7 +455,7 @@ impl Swapchain {
             .image_sharing_mode(vk::SharingMode::EXCLUSIVE)
             .pre_transform(caps.current_transform)
             .composite_alpha(composite_alpha(&caps))
-            .present_mode(self.desc.present_mode(&modes))
+            .present_mode(mode)
             .clipped(true)
             .old_swapchain(old);
         // SAFETY: values are within the surface's capabilities; the old swapchain is retired by this.
@@ -384,6 +464,7 @@ impl Swapchain {
         // SAFETY: no reference to its images remains and the device is idle. Null is allowed.
         unsafe { swapchains.destroy_swapchain(old, None) };
         self.raw = made.context("vkCreateSwapchainKHR")?;
+        self.first = self.number + 1;
         // one image is deferred while the next frame acquires another
         self.late = device.info().software && count > caps.min_image_count;
         device.0.name(self.raw, "swapchain");

@@ -39,7 +39,8 @@ pub struct FrameStats {
 pub struct CpuTimes {
     /// Gathering the scenes of the views.
     pub gather: f32,
-    /// Waiting for an earlier frame; with two frames in flight, for the one before the last.
+    /// Waiting for an earlier frame; with two frames in flight, for the one before the last. With `r_lowLatency` also
+    /// for the last one, after this frame's submission, and the time that the engine is kept then.
     pub wait: f32,
     /// Recording commands and uploading moving geometry.
     pub record: f32,
@@ -71,6 +72,9 @@ fn bytes_of_halves(texels: &[u8]) -> Vec<u8> {
 impl Renderer {
     /// Begins a frame; `time_ms`: shader time of 2D materials.
     pub fn begin_frame(&mut self, time_ms: i32) {
+        if self.swapchain.is_some() {
+            self.pacer.begin(Instant::now());
+        }
         self.set_eye(Eye::Both);
         self.held.begin_frame();
         self.overlay_time = time_ms as f32 * 0.001;
@@ -111,6 +115,7 @@ impl Renderer {
             self.queue_overlay();
             self.recycle_queue();
             self.scene.end_frame();
+            self.pacer.forget();
             return Ok(FrameStats::default());
         }
         let stats = self.flush(true)?;
@@ -168,6 +173,7 @@ impl Renderer {
         let begin = Instant::now();
         let mut recorder = self.ring.begin()?;
         let ready = Instant::now();
+        self.look_for_ends()?;
         stats.serial = recorder.serial();
         // colour channels that no eye draws keep old content
         if self.shown_anaglyph != self.settings.anaglyph {
@@ -224,11 +230,17 @@ impl Renderer {
         } else {
             self.ring.end(recorder)?;
         }
+        let submitted = Instant::now();
+        if show {
+            self.pace()?;
+        } else if end {
+            self.pacer.forget();
+        }
         stats.cpu = CpuTimes {
             gather: std::mem::take(&mut self.gather_ms),
-            wait: milliseconds(begin, ready),
+            wait: milliseconds(begin, ready) + milliseconds(submitted, Instant::now()),
             record: milliseconds(ready, recorded),
-            submit: milliseconds(recorded, Instant::now()),
+            submit: milliseconds(recorded, submitted),
         };
         Ok(stats)
     }

@@ -103,6 +103,7 @@ impl Renderer {
             passes: Costs::passes(&timings, rays),
             memory: Costs::memory(&self.device.memory_uses()),
             reserved: self.device.memory_report().reserved,
+            latency: self.latency(),
         }
     }
 

@@ -42,6 +42,18 @@ numbered! {
 }
 
 numbered! {
+    /// How many frames wait for the GPU and the display.
+    LowLatency {
+        /// Two.
+        Off = 0,
+        /// One.
+        One = 1,
+        /// One, and the engine is kept until the GPU is about to need its next frame.
+        JustInTime = 2,
+    }
+}
+
+numbered! {
     /// Output of the traced look.
     DebugOutput {
         /// The picture.

@@ -89,6 +89,8 @@ struct Extensions {
     query: bool,
     /// Both extensions of dynamic blending, culling and depth tests.
     dynamic_state: bool,
+    /// Numbers of presentations, and waiting for one, where there is a window.
+    present_wait: bool,
 }
 
 impl Extensions {
@@ -116,6 +118,9 @@ impl Extensions {
             query: acceleration && has(khr::ray_query::NAME),
             dynamic_state: has(ext::extended_dynamic_state::NAME)
                 && has(ext::extended_dynamic_state3::NAME),
+            present_wait: instance.surface.is_some()
+                && has(khr::present_id::NAME)
+                && has(khr::present_wait::NAME),
         })
     }
 }
@@ -136,6 +141,8 @@ struct Features {
     query: vk::PhysicalDeviceRayQueryFeaturesKHR<'static>,
     dynamic: vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT<'static>,
     dynamic3: vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT<'static>,
+    present_id: vk::PhysicalDevicePresentIdFeaturesKHR<'static>,
+    present_wait: vk::PhysicalDevicePresentWaitFeaturesKHR<'static>,
 }
 
 impl Features {
@@ -158,6 +165,11 @@ impl Features {
             chain = chain
                 .push_next(&mut found.dynamic)
                 .push_next(&mut found.dynamic3);
+        }
+        if extensions.present_wait {
+            chain = chain
+                .push_next(&mut found.present_id)
+                .push_next(&mut found.present_wait);
         }
         // SAFETY: the chain holds only structures of this version and of extensions that the device has.
         unsafe { (instance.raw).get_physical_device_features2(physical, &mut chain) };
@@ -229,6 +241,8 @@ impl Features {
             query,
             anisotropy: is_on(base.sampler_anisotropy),
             wireframe: is_on(base.fill_mode_non_solid),
+            present_wait: is_on(self.present_id.present_id)
+                && is_on(self.present_wait.present_wait),
             bc: is_on(base.texture_compression_bc),
             extended_formats: is_on(base.shader_storage_image_extended_formats),
             fragment_stores: is_on(base.fragment_stores_and_atomics),
@@ -407,6 +421,7 @@ fn info(
             .anisotropy
             .then_some(properties.limits.max_sampler_anisotropy),
         wireframe: abilities.wireframe,
+        present_wait: abilities.present_wait,
         bc: abilities.bc,
         float16: abilities.float16 && abilities.storage16,
         small_storage: abilities.storage16 && abilities.storage8,
