@@ -32,6 +32,14 @@ fn folder() -> &'static Path {
                 "library_path": data::built("layer", "layer"),
                 "api_version": "1.3.239",
                 "implementation_version": "1",
+                "device_extensions": [
+                    { "name": "VK_KHR_present_id", "spec_version": "1" },
+                    {
+                        "name": "VK_KHR_present_wait",
+                        "spec_version": "1",
+                        "entrypoints": ["vkWaitForPresentKHR"],
+                    },
+                ],
                 "description": "limits a device and makes calls fail, for tests",
             },
         });
@@ -51,6 +59,8 @@ pub struct Session {
     pub fault: Option<String>,
     /// Sizes that the window has one after the other, `WIDTHxHEIGHT`; 0x0 is minimised.
     pub sizes: Vec<&'static str>,
+    /// A display that says when it shows a picture: milliseconds between two, or `mute`, if it does not say it after all.
+    pub display: Option<&'static str>,
     /// Arguments of the program `session`.
     pub arguments: Vec<String>,
 }
@@ -111,6 +121,9 @@ impl Session {
         }
         if !self.sizes.is_empty() {
             command.env("RELIGHT_LAYER_SIZES", self.sizes.join(" "));
+        }
+        if let Some(display) = self.display {
+            command.env("RELIGHT_LAYER_DISPLAY", display);
         }
         if let Some(fault) = &self.fault {
             command.env("RELIGHT_LAYER_FAULT", fault);

@@ -286,6 +286,92 @@ fn a_window_may_be_minimised_and_resized_in_every_frame() {
     assert!(made >= 6, "{made} swapchains for 6 sizes");
 }
 
+/// The milliseconds that follow `mark` in a session's output.
+fn milliseconds(outcome: &Outcome, mark: &str) -> f64 {
+    let found = outcome.text.split_once(mark).and_then(|(_, rest)| {
+        let number = rest.split_once(" ms")?.0;
+        number.trim().parse().ok()
+    });
+    found.unwrap_or_else(|| panic!("no {mark}: {}", outcome.text))
+}
+
+/// A session whose display says when it shows a picture.
+fn on_display(display: &'static str, low_latency: &str, frames: &str) -> Session {
+    let more = [
+        "--costs",
+        "--frames",
+        frames,
+        "--set",
+        "r_swapInterval",
+        "1",
+    ];
+    let more = more
+        .into_iter()
+        .chain(["--set", "r_lowLatency", low_latency]);
+    Session {
+        display: Some(display),
+        // a device that does not put off showing
+        profiles: vec![profile("ampere")],
+        arguments: [looks("c"), more.map(str::to_owned).collect()].concat(),
+        ..Session::default()
+    }
+}
+
+#[test]
+fn one_frame_waits_for_the_display_where_it_says_when_it_shows_one() {
+    if !available() {
+        return;
+    }
+    let latency = |low_latency| {
+        let outcome = play(&on_display("40", low_latency, "60"));
+        assert_eq!(
+            (&outcome.failure, &outcome.ended, outcome.errors.len()),
+            (&None, &None, 0),
+            "{}",
+            outcome.text
+        );
+        let median = milliseconds(&outcome, "frames: median ");
+        println!("r_lowLatency {low_latency}: {median} ms in the median");
+        median
+    };
+    let [two, one] = ["0", "1"].map(latency);
+    // three and two intervals of the display
+    assert!(one < two - 20.0, "{one} ms with one, {two} ms with two");
+    assert!(latency("2") < two - 20.0);
+}
+
+#[test]
+fn a_display_that_shows_nothing_does_not_hold_the_game() {
+    if !available() {
+        return;
+    }
+    let outcome = play(&on_display("mute", "2", "60"));
+    assert_eq!(outcome.failure, None, "{}", outcome.text);
+    let waits = outcome.calls.get("vkWaitForPresentKHR").map_or(0, |c| c.0);
+    assert!(waits > 60, "{waits} calls");
+    // a wait for each would take 15 s
+    let passed = milliseconds(&outcome, "frames: 60 in ");
+    assert!(passed < 5000.0, "{passed} ms");
+}
+
+#[test]
+fn a_wait_for_the_display_may_fail() {
+    if !available() {
+        return;
+    }
+    let whole = play(&on_display("5", "1", "6"));
+    assert_eq!(whole.failure, None, "{}", whole.text);
+    let (last, results) = &whole.calls["vkWaitForPresentKHR"];
+    let mut sessions = Vec::new();
+    for number in spread(*last, 3) {
+        sessions.extend(results.iter().map(|result| Session {
+            fault: Some(format!("vkWaitForPresentKHR {number} {result}")),
+            ..on_display("5", "1", "6")
+        }));
+    }
+    play_all(&sessions, recovers);
+}
+
 #[test]
 fn a_display_that_is_lost_ends_the_game() {
     if !available() {

@@ -92,9 +92,10 @@ macro_rules! all_calls {
 
             vkCreateSwapchainKHR "HDLSI" hook4;
             vkGetSwapchainImagesKHR "HD" hook4;
-            vkAcquireNextImageKHR "HDLSOT" hook6;
+            vkAcquireNextImageKHR "HDLSOT" (display::acquire);
             vkAcquireNextImage2KHR "HDLSOT" hook3;
-            vkQueuePresentKHR "HDLSO" hook2;
+            vkQueuePresentKHR "HDLSO" (display::present);
+            vkWaitForPresentKHR "HDLSOT" (display::wait);
             vkGetDeviceGroupPresentCapabilitiesKHR "HD" hook2;
             vkGetDeviceGroupSurfacePresentModesKHR "HDS" hook3;
             vkCreateAccelerationStructureKHR "H" hook4;
@@ -168,6 +169,8 @@ pub const EXTENSIONS: &[&str] = &[
     "VK_EXT_validation_features",
     "VK_KHR_acceleration_structure",
     "VK_KHR_deferred_host_operations",
+    "VK_KHR_present_id",
+    "VK_KHR_present_wait",
     "VK_KHR_ray_query",
     "VK_KHR_ray_tracing_pipeline",
     "VK_KHR_surface",

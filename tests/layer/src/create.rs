@@ -8,7 +8,7 @@ use crate::calls::{Call, EXTENSIONS};
 use crate::chain::{LookUp, add, remove};
 use crate::faults::{self, Strike};
 use crate::profile::PROFILES;
-use crate::{devices, limits, memory};
+use crate::{devices, display, limits, memory};
 
 /// `VkLayerInstanceCreateInfo` and `VkLayerDeviceCreateInfo`.
 #[repr(C)]
@@ -141,7 +141,7 @@ pub unsafe extern "system" fn device(
     // SAFETY: this is its type.
     let create: vk::PFN_vkCreateDevice = unsafe { chain.next(Call::vkCreateDevice) };
     // SAFETY: the caller's arguments; the list of queues may be this layer's, which outlives the call.
-    let result = unsafe { create(physical, &info, allocator, device) };
+    let result = unsafe { display::device(info, |info| create(physical, info, allocator, device)) };
     if result == vk::Result::SUCCESS {
         // SAFETY: the call succeeded, so it has written the handle.
         let made = unsafe { *device };

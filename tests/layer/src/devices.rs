@@ -9,8 +9,8 @@ use ash::vk::{self, Handle};
 use crate::calls::Call;
 use crate::chain::{self, Chain};
 use crate::faults::{self, Strike};
-use crate::limits;
 use crate::profile::{Profile, profiles};
+use crate::{display, limits};
 
 /// What a handle of ours points at. The loader reads the first word, which is its dispatch table.
 #[repr(C)]
@@ -154,10 +154,11 @@ pub unsafe extern "system" fn extensions(
     // SAFETY: the pointer is this function of the next layer.
     let next: vk::PFN_vkEnumerateDeviceExtensionProperties =
         unsafe { chain.next(Call::vkEnumerateDeviceExtensionProperties) };
-    let Some(profile) = profile.filter(|_| layer.is_null()) else {
+    let added = display::extensions();
+    if !layer.is_null() || (profile.is_none() && added.is_empty()) {
         // SAFETY: the caller's arguments.
         return unsafe { next(real, layer, count, properties) };
-    };
+    }
     let mut all = 0;
     // SAFETY: a place for the number.
     let result = unsafe { next(real, layer, &mut all, std::ptr::null_mut()) };
@@ -170,7 +171,11 @@ pub unsafe extern "system" fn extensions(
     if result != vk::Result::SUCCESS {
         return result;
     }
-    list.retain(|e| e.extension_name_as_c_str().is_ok_and(|n| !profile.hides(n)));
+    list.retain(|e| {
+        let hidden = |n| profile.is_some_and(|profile| profile.hides(n));
+        e.extension_name_as_c_str().is_ok_and(|n| !hidden(n))
+    });
+    list.extend(added);
     // SAFETY: the caller's arguments.
     unsafe { write_list(&list, count, properties) }
 }
@@ -198,9 +203,28 @@ changed! {
     properties PFN_vkGetPhysicalDeviceProperties vkGetPhysicalDeviceProperties vk::PhysicalDeviceProperties, limits::properties;
     properties2 PFN_vkGetPhysicalDeviceProperties2 vkGetPhysicalDeviceProperties2 vk::PhysicalDeviceProperties2<'_>, limits::properties2;
     features PFN_vkGetPhysicalDeviceFeatures vkGetPhysicalDeviceFeatures vk::PhysicalDeviceFeatures, limits::features;
-    features2 PFN_vkGetPhysicalDeviceFeatures2 vkGetPhysicalDeviceFeatures2 vk::PhysicalDeviceFeatures2<'_>, limits::features2;
     memory PFN_vkGetPhysicalDeviceMemoryProperties vkGetPhysicalDeviceMemoryProperties vk::PhysicalDeviceMemoryProperties, limits::memory;
     memory2 PFN_vkGetPhysicalDeviceMemoryProperties2 vkGetPhysicalDeviceMemoryProperties2 vk::PhysicalDeviceMemoryProperties2<'_>, limits::memory2;
+}
+
+/// # Safety
+/// That of `vkGetPhysicalDeviceFeatures2`.
+pub unsafe extern "system" fn features2(
+    physical: vk::PhysicalDevice,
+    answer: *mut vk::PhysicalDeviceFeatures2<'_>,
+) {
+    let Some((real, profile, chain)) = open(physical) else {
+        return;
+    };
+    // SAFETY: the pointer is this function of the next layer.
+    let next: vk::PFN_vkGetPhysicalDeviceFeatures2 =
+        unsafe { chain.next(Call::vkGetPhysicalDeviceFeatures2) };
+    // SAFETY: the caller's arguments.
+    unsafe { display::features2(answer, || next(real, answer)) };
+    if let Some(profile) = profile {
+        // SAFETY: the caller passes a valid structure, with a chain of valid ones.
+        unsafe { limits::features2(profile, &mut *answer) };
+    }
 }
 
 /// # Safety

@@ -5,7 +5,7 @@ use std::ffi::c_void;
 use ash::vk;
 
 use crate::calls::{Call, all_calls};
-use crate::{chain, create, devices, faults, memory, window};
+use crate::{chain, create, devices, display, faults, memory, window};
 
 /// A function.
 pub struct Hook(pub *const c_void);

@@ -5,6 +5,7 @@
 //! * `RELIGHT_LAYER_FAULT`: `FUNCTION NUMBER RESULT`. That call of the function, counted from 1, fails with the result
 //!   ([`faults`]).
 //! * `RELIGHT_LAYER_SIZES`: sizes of the window ([`window`]).
+//! * `RELIGHT_LAYER_DISPLAY`: a display that says when it shows a picture ([`display`]).
 //! * `RELIGHT_LAYER_LOG`: a file that gets a line `FUNCTION NUMBER` for each call that returns a `VkResult`, and a line
 //!   `unknown EXTENSION` for each extension that the application enables and whose functions the layer does not know.
 //!
@@ -14,6 +15,7 @@ mod calls;
 mod chain;
 mod create;
 mod devices;
+mod display;
 mod faults;
 mod hooks;
 mod limits;
@@ -105,7 +107,7 @@ fn find(name: &CStr, below: impl Fn() -> vk::PFN_vkVoidFunction) -> vk::PFN_vkVo
         name.to_bytes(),
         b"vkCreateInstance" | b"vkGetInstanceProcAddr" | b"vkGetDeviceProcAddr"
     );
-    let Some(own) = own.filter(|_| first || below.is_some()) else {
+    let Some(own) = own.filter(|_| first || below.is_some() || display::has(name)) else {
         return below;
     };
     // SAFETY: the pointer is a function with the signature of this name.

@@ -13,14 +13,17 @@ use relight::compare::Rgb8;
 use tests::engine::{Engine, LoadError, Options, Tables, View, has_surfaces};
 use tests::maps::{self, HERE, ROOMS};
 
-const USAGE: &str = "usage: session FOLDER [--looks LOOKS] [--frames N] [--window] [--set NAME VALUE]...
+const USAGE: &str = "usage: session FOLDER [--looks LOOKS] [--frames N] [--costs] [--window] [--set NAME VALUE]...
 
 Plays the map of the tests in the stand-in engine: menu, map, N + 1 frames (default 2) of each look (c: classic, t:
-traced; default ct), a restart of the video, the map again. Leaves the pictures in FOLDER. With --window it opens a
-window of SDL; otherwise its window has a surface without a display.";
+traced; default ct), a restart of the video, the map again. Leaves the pictures in FOLDER. With --costs it prints
+`frames: N in MS ms` for each look and what rt_stats prints. With --window it opens a window of SDL; otherwise its window
+has a surface without a display.";
 
 /// Errors after which the session begins anew; more mean that it does not recover.
 const ERRORS: usize = 3;
+/// Frames until rt_stats prints.
+const COSTS: u32 = 4;
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -30,12 +33,13 @@ fn main() -> ExitCode {
         return ExitCode::FAILURE;
     };
     let mut cvars = Vec::new();
-    let (mut looks, mut frames, mut tables) = ("ct", 1, Tables::Quake3e);
+    let (mut looks, mut frames, mut costs, mut tables) = ("ct", 1, false, Tables::Quake3e);
     while let Some(argument) = rest.next() {
         let mut value = || rest.next().unwrap_or_default();
         match argument {
             "--looks" => looks = value(),
             "--frames" => frames = value().parse().unwrap_or(1),
+            "--costs" => costs = true,
             "--window" => tables = Tables::Ioquake3,
             "--set" => cvars.push((value().to_owned(), value().to_owned())),
             _ => {
@@ -54,10 +58,10 @@ fn main() -> ExitCode {
         cvars,
         ..Options::default()
     };
-    session(&folder, (looks, frames), options)
+    session(&folder, (looks, frames, costs), options)
 }
 
-fn session(folder: &Path, looks: (&str, u32), options: Options) -> ExitCode {
+fn session(folder: &Path, looks: (&str, u32, bool), options: Options) -> ExitCode {
     let mut engine = match Engine::start(options) {
         Ok(engine) => engine,
         Err(error) => return ended(&error),
@@ -112,7 +116,11 @@ fn report(engine: &Engine) -> bool {
     engine.violations().is_empty() && engine.validation_messages().is_empty()
 }
 
-fn play(engine: &mut Engine, folder: &Path, (looks, frames): (&str, u32)) -> Result<(), LoadError> {
+fn play(
+    engine: &mut Engine,
+    folder: &Path,
+    (looks, frames, costs): (&str, u32, bool),
+) -> Result<(), LoadError> {
     let view = View::new(HERE, 30.0);
     engine.set("r_rt", "0");
     engine.start_map(ROOMS)?;
@@ -123,11 +131,21 @@ fn play(engine: &mut Engine, folder: &Path, (looks, frames): (&str, u32)) -> Res
             _ => ("0", "classic"),
         };
         engine.set("r_rt", value);
-        for _ in 0..frames {
-            engine.begin_frame(0)?;
-            engine.clear_scene()?;
-            engine.render_scene(&view)?;
-            engine.end_frame()?;
+        let draw = |engine: &mut Engine, frames: u32| -> Result<(), LoadError> {
+            for _ in 0..frames {
+                engine.begin_frame(0)?;
+                engine.clear_scene()?;
+                engine.render_scene(&view)?;
+                engine.end_frame()?;
+            }
+            Ok(())
+        };
+        let start = std::time::Instant::now();
+        draw(engine, frames)?;
+        if costs {
+            println!("frames: {frames} in {} ms", start.elapsed().as_millis());
+            engine.command("rt_stats")?;
+            draw(engine, COSTS)?;
         }
         save(
             &engine.picture(&view)?,
