@@ -38,7 +38,7 @@ pub struct Outcome {
     pub pictures: HashMap<String, Rgb8>,
 }
 
-/// Software rendering takes every core, so runs take turns.
+/// Software rendering takes every core, so runs take turns, but for pairs: an engine loads on one core.
 static TURN: Mutex<()> = Mutex::new(());
 
 /// Whether the engine, the game and a display in memory are here; otherwise the test is reported as skipped.
@@ -102,6 +102,22 @@ impl Run {
     /// When it cannot be started at all.
     pub fn go(&self) -> Outcome {
         let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+        self.go_now()
+    }
+
+    /// Runs two engines beside each other to their ends.
+    ///
+    /// # Panics
+    /// When one cannot be started at all.
+    pub fn go_both(runs: [&Self; 2]) -> [Outcome; 2] {
+        let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+        std::thread::scope(|scope| {
+            runs.map(|run| scope.spawn(|| run.go_now()))
+                .map(|run| run.join().expect("a run that did not panic"))
+        })
+    }
+
+    fn go_now(&self) -> Outcome {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let (config, home, log) = (
             folder.path().join("run.cfg"),

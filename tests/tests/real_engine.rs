@@ -39,6 +39,28 @@ fn run_with(
     commands: Vec<String>,
     files: Vec<(String, Vec<u8>)>,
 ) -> real::Outcome {
+    prepared(renderer, size, commands, files).go()
+}
+
+/// The engine's own renderer and this one, beside each other, with commands and files for each.
+fn run_both(
+    size: (u32, u32),
+    commands: [Vec<String>; 2],
+    files: &[(String, Vec<u8>)],
+) -> [real::Outcome; 2] {
+    let [reference, ours] = commands;
+    Run::go_both([
+        &prepared("opengl1", size, reference, files.to_vec()),
+        &prepared("vk", size, ours, files.to_vec()),
+    ])
+}
+
+fn prepared(
+    renderer: &'static str,
+    size: (u32, u32),
+    commands: Vec<String>,
+    files: Vec<(String, Vec<u8>)>,
+) -> Run {
     let cvars = [("r_rt", "0"), ("r_vkValidation", "1")]
         .map(|(n, v)| (n.to_string(), v.to_string()))
         .to_vec();
@@ -51,7 +73,6 @@ fn run_with(
         commands,
         limit: 600,
     }
-    .go()
 }
 
 fn set(commands: &mut Vec<String>, lines: &[&str]) {
@@ -75,16 +96,13 @@ fn the_classic_look_is_the_engines_own() {
     for (map, camera) in VIEWS.iter().chain(CLASSIC_VIEWS) {
         let mut commands = start_map(map);
         commands.extend(picture(camera, 30, "shot"));
-        let reference = run("opengl1", (640, 480), commands);
+        let mut with_info = commands.clone();
+        set(&mut with_info, &["gfxinfo"]);
+        let [reference, ours] = run_both((640, 480), [commands, with_info], &[]);
         reference.assert_clean();
-        let reference = reference.picture("shot");
-        assert_plausible(reference, map);
-        let mut commands = start_map(map);
-        commands.extend(picture(camera, 30, "shot"));
-        set(&mut commands, &["gfxinfo"]);
-        let ours = run("vk", (640, 480), commands);
         ours.assert_clean();
-        let picture = ours.picture("shot");
+        let (reference, picture) = (reference.picture("shot"), ours.picture("shot"));
+        assert_plausible(reference, map);
         keep_picture(reference, &format!("{map}-opengl1"));
         keep_picture(picture, &format!("{map}-classic"));
         let difference = compare(reference, picture).unwrap();
@@ -126,14 +144,14 @@ fn films_that_the_engine_decodes_are_shown() {
         "wait 6",
     ];
     for (name, lines) in [("cinematic", &whole[..]), ("videoMap", &behind[..])] {
-        let [reference, ours] = ["opengl1", "vk"].map(|renderer| {
-            let mut commands = Vec::new();
-            set(
-                &mut commands,
-                &["set con_notifytime -1", "set r_ignorehwgamma 1", "wait 20"],
-            );
-            set(&mut commands, lines);
-            let outcome = run_with(renderer, (320, 240), commands, film_files());
+        let mut commands = Vec::new();
+        set(
+            &mut commands,
+            &["set con_notifytime -1", "set r_ignorehwgamma 1", "wait 20"],
+        );
+        set(&mut commands, lines);
+        let both = [commands.clone(), commands];
+        let [reference, ours] = run_both((320, 240), both, &film_files()).map(|outcome| {
             outcome.assert_clean();
             outcome.picture("shot").clone()
         });
@@ -166,31 +184,31 @@ fn the_traced_look_shows_the_same_places() {
     if !real::available() {
         return;
     }
-    let references = VIEWS.map(|(map, camera)| {
-        let mut commands = start_map(map);
-        commands.extend(picture(camera, 8, "shot"));
-        let outcome = run("opengl1", (320, 240), commands);
-        outcome.picture("shot").clone()
-    });
-    for (view, (map, camera)) in VIEWS.into_iter().enumerate() {
-        let mut commands = start_map(map);
+    let pictures = VIEWS.map(|(map, camera)| {
+        let mut classic = start_map(map);
+        classic.extend(picture(camera, 8, "shot"));
+        let mut traced = start_map(map);
         set(
-            &mut commands,
+            &mut traced,
             &[&format!("setviewpos {camera}"), "set r_rt 1"],
         );
-        commands.extend(picture(camera, 8, "shot"));
-        set(&mut commands, &["rt_lights"]);
-        let ours = run("vk", (320, 240), commands);
+        traced.extend(picture(camera, 8, "shot"));
+        set(&mut traced, &["rt_lights"]);
+        let [reference, ours] = run_both((320, 240), [classic, traced], &[]);
         ours.assert_clean();
         let picture = ours.picture("shot");
         keep_picture(picture, &format!("{map}-traced"));
         assert_plausible(picture, map);
-        let ssim = references
+        [reference.picture("shot").clone(), picture.clone()]
+    });
+    for (view, [reference, picture]) in pictures.iter().enumerate() {
+        let map = VIEWS[view].0;
+        let ssim = pictures
             .each_ref()
-            .map(|r| compare(r, picture).unwrap().ssim);
+            .map(|[r, _]| compare(r, picture).unwrap().ssim);
         println!(
             "{map}: {ssim:.3?}, luminance {:.1} and {:.1}",
-            references[view].mean_luminance(),
+            reference.mean_luminance(),
             picture.mean_luminance()
         );
         let own = ssim[view];
