@@ -1,5 +1,5 @@
 //! The arrows between crates and modules: a crate uses those that ARCHITECTURE.md's table allows, and no modules at the top
-//! of a crate use each other in a circle.
+//! of a crate use each other in a circle. Unsafe code is where its rule says.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -223,6 +223,46 @@ fn front_ends_alone_name_engines() {
         let named = NAMES.iter().find(|name| code.contains(**name));
         assert_eq!(named, None, "{place}");
     }
+}
+
+/// Whether a source has the word `unsafe`, not only as a part of a lint's name.
+fn is_unsafe(code: &str) -> bool {
+    let part = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');
+    code.match_indices("unsafe").any(|(at, word)| {
+        let (before, after) = (&code[..at], &code[at + word.len()..]);
+        !part(before.chars().next_back()) && !part(after.chars().next())
+    })
+}
+
+#[test]
+fn unsafe_code_is_in_the_folders_of_its_rule() {
+    let page = read(&tests::data::repository().join("ARCHITECTURE.md"));
+    let rule = page.split("* **Unsafe** code").nth(1).expect("the rule");
+    let rule = rule.split("\n* ").next().expect("its text");
+    let folders: Vec<&str> = rule.split('`').skip(1).step_by(2).collect();
+    let mut found = BTreeSet::new();
+    for member in members() {
+        let mut files = Vec::new();
+        sources(
+            &tests::data::repository().join(&member).join("src"),
+            &mut files,
+        );
+        for path in files.iter().filter(|path| is_unsafe(&code(path))) {
+            let place = path.strip_prefix(tests::data::repository());
+            let place = place.expect("a file of ours").to_string_lossy();
+            let folder = folders.iter().find(|folder| place.starts_with(**folder));
+            found.insert(*folder.unwrap_or_else(|| panic!("{place}: unsafe code")));
+        }
+    }
+    assert_eq!(found, folders.into_iter().collect(), "folders without any");
+}
+
+#[test]
+fn unsafe_is_a_word_not_a_part_of_one() {
+    assert!(is_unsafe("let x = unsafe { f() };") && is_unsafe("unsafe\n"));
+    assert!(!is_unsafe(
+        "#![forbid(unsafe_code)] #![warn(unsafe_op_in_unsafe_fn)]"
+    ));
 }
 
 #[test]
