@@ -373,6 +373,21 @@ impl Renderer {
         }
     }
 
+    /// Replaces the mean of the accumulated frames by another linear picture before exposure, of the traced size, such
+    /// as a filtered one: the next frames show it, with bloom, exposure and tone curve of their own, and leave it as it
+    /// is, until their content changes. False if no frames are accumulated.
+    ///
+    /// # Errors
+    /// A wrong number of pixels; the device is lost or out of memory.
+    pub fn replace_radiance(&mut self, radiance: &[[f32; 3]]) -> Result<bool, Error> {
+        self.flush(false)?;
+        let texels: Vec<[f32; 4]> = radiance.iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
+        match &mut self.trace {
+            Some(trace) => Ok(trace.replace_mean(&texels)?),
+            None => Ok(false),
+        }
+    }
+
     /// RGB of a linear image.
     pub(super) fn radiance_of(&self, hdr: &Image) -> Result<Vec<[f32; 3]>, Error> {
         let bytes = self.device.read_image(hdr)?;

@@ -220,6 +220,14 @@ impl TraceLook {
         self.tracer.accumulated_frames()
     }
 
+    /// Replaces that mean; false if there is none.
+    ///
+    /// # Errors
+    /// A wrong number of texels, or no memory to upload them.
+    pub fn replace_mean(&mut self, texels: &[[f32; 4]]) -> Result<bool, Error> {
+        self.tracer.replace_mean(texels)
+    }
+
     /// Records all passes of a view into its rectangle of the target, and tests the visibility of its flares.
     ///
     /// # Errors

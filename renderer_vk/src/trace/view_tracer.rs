@@ -95,6 +95,9 @@ pub struct ViewTracer {
 const LIGHT_ADAPTATION: f32 = 0.1;
 const DARK_ADAPTATION: f32 = 0.4;
 
+/// Number of frames that a given mean counts as: a frame of radiance 60000, the largest, changes it by less than 1e-4.
+const WHOLE_WEIGHT: u32 = 1 << 30;
+
 impl ViewTracer {
     /// Makes the state that persists between frames.
     ///
@@ -147,6 +150,21 @@ impl ViewTracer {
     /// Rays of each counter (`COUNT_*`) in the newest finished frame; `None` while rays are not counted.
     pub fn rays(&self) -> Option<[u64; COUNTERS]> {
         self.counters.rays()
+    }
+
+    /// Replaces the mean of the accumulated frames by these texels, of the traced size; false if there is no mean.
+    /// Later frames of the same content leave it as it is.
+    ///
+    /// # Errors
+    /// A wrong number of texels, or no memory to upload them.
+    pub fn replace_mean(&mut self, texels: &[[f32; 4]]) -> Result<bool, Error> {
+        let mean = self.targets.as_ref().and_then(|t| t.accumulation.as_ref());
+        let Some(mean) = mean.filter(|_| self.accumulated.1 > 0) else {
+            return Ok(false);
+        };
+        (self.device).upload_image(mean, 0, 0, bytemuck::cast_slice(texels))?;
+        self.accumulated.1 = WHOLE_WEIGHT;
+        Ok(true)
     }
 
     /// Discards accumulated frames.
