@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::chosen::{ChosenCamera, ChosenMap};
+use crate::denoise::DenoiseArgs;
 use crate::numbers;
 use crate::pictures::{check_name, write_rgb, write_whole};
 use crate::settings::{Assignment, SettingArgs, default, help, value_of};
@@ -42,6 +43,7 @@ pub enum Sampling {
 ///
 /// Examples: relight render oa_dm1 -o oa_dm1.png; relight render my.bsp --spawn 2 --look classic -o spawn.png;
 /// relight render oa_dm1 --view 100,-50,80,90,10 --spp 256 --size 640x480 -o view.png;
+/// relight render oa_dm1 --spp 64 --denoise oidn -o clean.png;
 /// relight render oa_dm1 --path flight.txt --frames 120 --spp 16 -o flight.png (flight_0000.png, flight_0001.png, …)
 #[derive(Args, Debug)]
 pub struct RenderArgs {
@@ -121,6 +123,8 @@ pub struct RenderArgs {
     debug: Assignment,
     #[arg(long, help = help("rt_denoiser"), value_parser = value_of("rt_denoiser"), default_value = default("rt_denoiser"))]
     denoiser: Assignment,
+    #[command(flatten)]
+    denoise: DenoiseArgs,
     /// No temporal antialiasing of frames that do not accumulate
     #[arg(long)]
     no_taa: bool,
@@ -323,6 +327,8 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
             "--frames is the number of pictures of a --path; --spp is the number of frames drawn for one picture"
         );
     }
+    let settings = args.settings();
+    let denoiser = args.denoise.filter(&settings)?;
     let (files, map) = args.chosen.open()?;
     let (width, height) = args.size;
     let mut renderer = Renderer::new(RendererOptions {
@@ -332,7 +338,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     })
     .context("no picture without a Vulkan device")?;
     let info = renderer.device_info().clone();
-    let (_, entities) = load(&mut renderer, files, &map, &args.settings())?;
+    let (_, entities) = load(&mut renderer, files, &map, &settings)?;
     let camera = match args.path {
         Some(_) => Camera::default(),
         None => args.camera(&renderer.world().context("no map")?.relit)?,
@@ -353,6 +359,11 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         timings.add(&renderer, &stats);
         if let Some(path) = written {
             timings.finish(&mut renderer)?;
+            if let Some(denoiser) = &denoiser {
+                denoiser.apply(&mut renderer, &settings, |renderer| {
+                    draw(renderer, &entities, def).map(drop)
+                })?;
+            }
             let picture = renderer.read_pixels()?;
             write_rgb(path, &picture.rgb, picture.width, picture.height)?;
             if json {

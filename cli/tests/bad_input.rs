@@ -209,3 +209,28 @@ fn a_pack_with_everything_below_one_folder_names_the_folder() {
         assert!(error("none.pk3").contains("no maps in it"));
     }
 }
+
+#[test]
+fn an_absent_denoiser_is_told_with_the_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |more: &[&str]| {
+        let usual = ["render", "--sample", "-o", "out.png", "--denoise", "oidn"];
+        let output = relight(folder.path(), &[&usual, more].concat());
+        assert_eq!(output.status.code(), Some(1), "{more:?}: {output:?}");
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let text = refused(&["--oidn", "nowhere/libOpenImageDenoise.so.2"]);
+    assert_eq!(text.lines().count(), 1, "{text}");
+    for part in ["install it", "--oidn", "nowhere/libOpenImageDenoise.so.2: "] {
+        assert!(text.contains(part), "{text}");
+    }
+    // not even looked for
+    let wrong = |more: &[&str], part: &str| {
+        let text = refused(more);
+        assert!(text.contains(part), "{text}");
+    };
+    wrong(&["--look", "classic"], "traced look");
+    wrong(&["--render-scale", "0.5"], "--render-scale 1");
+    wrong(&["--debug", "1"], "rt_debug 0");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}

@@ -1,0 +1,114 @@
+//! `relight render --denoise`: an accumulated picture without its noise, by Open Image Denoise.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, ensure};
+use clap::{Args, ValueEnum};
+use oidn::{Guides, Oidn};
+use renderer_vk::{DebugOutput, Renderer, Settings};
+
+use crate::surfaces::{Mean, Texel, albedo, normal};
+
+/// Filter of accumulated pictures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Filter {
+    /// Open Image Denoise, a library that must be installed.
+    Oidn,
+}
+
+// No documentation comment: clap would show it in place of a subcommand's own description.
+
+// Options of the filter.
+#[derive(Args, Debug)]
+pub struct DenoiseArgs {
+    /// Remove the noise that is left in the mean of --spp frames, before exposure and tone curve; --denoiser is for
+    /// frames that do not accumulate
+    #[arg(long, value_enum, value_name = "FILTER", conflicts_with_all = ["no_accumulation", "timings", "frame_times", "stats"])]
+    denoise: Option<Filter>,
+    /// The library of --denoise oidn; default: libOpenImageDenoise of the system
+    #[arg(long, value_name = "FILE", requires = "denoise")]
+    oidn: Option<PathBuf>,
+}
+
+/// Frames that a guide is the mean of. Their cameras differ within a pixel, as those of the picture do.
+const GUIDE_FRAMES: u16 = 16;
+
+impl DenoiseArgs {
+    /// The filter, if one is wanted, for pictures with these settings.
+    ///
+    /// # Errors
+    /// Its library is absent, or the settings give no accumulated picture of the output's size.
+    pub fn filter(&self, settings: &Settings) -> Result<Option<Denoiser>> {
+        if self.denoise.is_none() {
+            return Ok(None);
+        }
+        ensure!(settings.rt, "--denoise is for the traced look");
+        ensure!(
+            settings.rt_accumulate && settings.rt_debug == DebugOutput::None,
+            "--denoise filters the mean picture: it needs rt_accumulate 1 and rt_debug 0"
+        );
+        ensure!(
+            settings.rt_scale >= 1.0,
+            "--denoise filters pictures of the traced size: it needs --render-scale 1"
+        );
+        let oidn = Oidn::load(self.oidn.as_deref()).context(
+            "--denoise needs the library Open Image Denoise: install it (a package of your system, or openimagedenoise.org), \
+             or name its file with --oidn",
+        )?;
+        Ok(Some(Denoiser { oidn }))
+    }
+}
+
+/// A loaded filter.
+pub struct Denoiser {
+    oidn: Oidn,
+}
+
+impl Denoiser {
+    /// Filters the accumulated picture of a view, so that the renderer shows the result. `draw` draws a frame of the
+    /// view.
+    ///
+    /// # Errors
+    /// The library's, or the device is lost or out of memory.
+    pub fn apply(
+        &self,
+        renderer: &mut Renderer,
+        settings: &Settings,
+        mut draw: impl FnMut(&mut Renderer) -> Result<()>,
+    ) -> Result<()> {
+        let color = renderer.read_radiance()?;
+        let (width, height) = renderer.size();
+        let mut guide = |output, texel: &dyn Fn(&[u8]) -> Texel| {
+            renderer.set_settings(&Settings {
+                rt_debug: output,
+                // light is not shown
+                rt_bounces: 0,
+                ..settings.clone()
+            });
+            let mut mean = Mean::new(color.len());
+            for _ in 0..GUIDE_FRAMES {
+                draw(renderer)?;
+                let shown = renderer.read_pixels()?;
+                mean.add(shown.rgb.chunks_exact(3).map(texel));
+            }
+            anyhow::Ok(mean.texels())
+        };
+        let albedo = guide(DebugOutput::Albedo, &albedo())?;
+        let normal = guide(DebugOutput::Normals, &normal)?;
+        let guides = Guides {
+            albedo: &albedo,
+            normal: &normal,
+            clean: true,
+        };
+        let size = (width as usize, height as usize);
+        let filtered = self.oidn.denoise(size, &color, Some(guides))?;
+        renderer.set_settings(settings);
+        // the guides' frames have ended the mean; a new one begins, which the filtered picture replaces
+        draw(renderer)?;
+        ensure!(
+            renderer.replace_radiance(&filtered)?,
+            "there is no mean picture to filter"
+        );
+        draw(renderer)
+    }
+}
