@@ -19,6 +19,13 @@ pub fn normal(rgb: &[u8]) -> Texel {
     std::array::from_fn(|k| f32::from(rgb[k]) / 127.5 - 1.0)
 }
 
+/// Decodes the view distance that `rt_debug 3` shows, units, from 8 to 7950 in steps of 2.8 %; `None` where it shows
+/// black, because no surface is lit there or it is farther.
+pub fn distance(rgb: &[u8]) -> Option<f32> {
+    let shown = f32::from(rgb[0]) / 255.0;
+    (shown > 0.0).then(|| (3.0 + 10.0 * (1.0 - shown)).exp2())
+}
+
 /// Mean of pictures.
 pub struct Mean {
     sum: Vec<Texel>,
@@ -63,6 +70,10 @@ mod tests {
         assert!((albedo(&[188; 3])[0] - 0.5).abs() < 0.01);
         assert_eq!(normal(&[0, 0, 0]), [0.0; 3]);
         assert_eq!(normal(&[255, 0, 255]), [1.0, -1.0, 1.0]);
+        assert_eq!(distance(&[0; 3]), None);
+        assert_eq!(distance(&[255; 3]), Some(8.0));
+        let far = distance(&[102; 3]).expect("a surface");
+        assert!((far - 512.0).abs() < 1.0e-2, "{far}");
     }
 
     #[test]

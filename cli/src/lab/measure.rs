@@ -7,12 +7,13 @@
 //!
 //! Similarity is measured over all pixels, and separately for those with specular paths (mirror, portal, glass, liquid
 //! or shiny surface; `rt_debug 11`) and for the others. Light is compared before display: clipping at white and
-//! rounding to black change means.
+//! rounding to black change means; so is the contrast of shadows ([`shadows`]).
 
 mod clips;
 mod cut;
 mod matrix;
 mod region;
+mod shadows;
 mod stage;
 mod table;
 
@@ -30,8 +31,9 @@ use serde_json::{Value, json};
 
 use self::clips::Clip;
 use self::region::Regions;
+use self::shadows::Shadows;
 use self::stage::{Stage, Variant, variants};
-use super::statistics::{luminance, relative_bias, relative_error};
+use super::statistics::{luminance, mean_of, relative_bias, relative_error};
 use crate::cameras::{Place, places};
 use crate::chosen::parse_view;
 use crate::game::Maps;
@@ -43,9 +45,9 @@ use crate::view::{Camera, load, map_name, open};
 /// Measure the traced look in real time against its reference
 ///
 /// For each place: similarity of the picture after a short turn of the camera (raw, denoised, denoised and antialiased,
-/// and a baseline with uniform light selection and a denoiser without gradients), noise over time at rest, frames until
-/// a light that was switched off has disappeared, and the trail of a moving light. With --cut, --matrix or --clips
-/// something else in place of it.
+/// and a baseline with uniform light selection and a denoiser without gradients), contrast of shadows by their distance,
+/// noise over time at rest, frames until a light that was switched off has disappeared, and the trail of a moving light.
+/// With --cut, --matrix or --clips something else in place of it.
 ///
 /// Examples: relight-lab measure oa_dm1 kaos2 --reference 4096 -o out/measure; relight-lab measure oa_dm1 --cut;
 /// relight-lab measure oa_dm1 --clips out/clips --reference 1024 --picture denoised-taa
@@ -182,8 +184,11 @@ fn place(
     bar: &ProgressBar,
 ) -> Result<Value> {
     bar.set_message(format!("{name}: reference"));
-    let (truth, _) = stage.reference(base, camera, &[], args.reference, bar)?;
-    let regions = Regions::new(&truth, stage.specular(base, camera)?);
+    let (truth, light) = stage.reference(base, camera, &[], args.reference, bar)?;
+    let specular = stage.specular(base, camera)?;
+    let surfaces = stage.surfaces(base, camera)?;
+    let shadows = Shadows::new(truth.width(), &light, &surfaces, &specular);
+    let regions = Regions::new(&truth, specular);
     let lights = match args.no_lights {
         true => None,
         false => Some(Lights::new(stage, args, base, camera, bar)?),
@@ -207,6 +212,7 @@ fn place(
             bar.inc(1);
         }
         let picture = stage.picture()?;
+        let arrived = stage.light()?;
 
         // at rest: first half to settle, second half to measure
         let mut watched = Vec::new();
@@ -219,6 +225,8 @@ fn place(
         }
         let rested = stage.picture()?;
         let mut result = regions.compare(&picture, &rested, &watched)?;
+        result.insert("shadows".into(), shadows.json(&arrived));
+        result.insert("rest_shadows".into(), shadows.json(&mean_of(&watched)));
         if let Some(lights) = &lights {
             let (figures, flown) = lights.measure(stage, args, camera, bar)?;
             result.extend(figures);

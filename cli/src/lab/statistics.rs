@@ -24,6 +24,17 @@ pub fn marked_mean(values: &[f32], part: &[bool]) -> f32 {
     (sum / marked().count().max(1) as f64) as f32
 }
 
+/// Mean of pictures of one size.
+pub fn mean_of(pictures: &[Vec<f32>]) -> Vec<f32> {
+    let mut mean = vec![0.0; pictures.first().map_or(0, Vec::len)];
+    for picture in pictures {
+        for (mean, value) in mean.iter_mut().zip(picture) {
+            *mean += value / pictures.len() as f32;
+        }
+    }
+    mean
+}
+
 /// Temporal noise: median over the selected pixels of standard deviation over mean in time.
 pub fn temporal_noise(frames: &[Vec<f32>], part: &[bool]) -> f32 {
     let count = frames.len() as f32;
@@ -78,6 +89,8 @@ mod tests {
         assert_eq!(temporal_noise(&[], &[]), 0.0);
         assert!((marked_mean(&[1.0, 5.0, 2.0], &[true, false, true]) - 1.5).abs() < 1.0e-6);
         assert_eq!(marked_mean(&[1.0], &[false]), 0.0);
+        assert_eq!(mean_of(&frames), [1.0, 2.0, 0.0]);
+        assert!(mean_of(&[]).is_empty());
     }
 
     #[test]

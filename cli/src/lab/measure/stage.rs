@@ -7,6 +7,8 @@ use relight::compare::Rgb8;
 use renderer_vk::api::{DynamicLight, RefDef, RefEntity, renderfx};
 use renderer_vk::{DebugOutput, DenoiserChoice, FrameStats, LightSelection, Renderer, Settings};
 
+use super::shadows::Surface;
+use crate::surfaces::{Mean, albedo, distance};
 use crate::view::Camera;
 
 /// Rotation of the camera in degrees, and its movement in units, in a frame on its way to a place: about those of a
@@ -53,6 +55,9 @@ pub fn variants(base: &Settings) -> Vec<Variant> {
         }),
     ]
 }
+
+/// Frames that the albedo of surfaces is the mean of: cameras differ within a pixel, as those of the reference do.
+const ALBEDO_FRAMES: u32 = 32;
 
 /// A loaded map with a camera.
 pub struct Stage {
@@ -153,6 +158,34 @@ impl Stage {
         let picture = self.picture()?;
         let pixels = picture.pixels().chunks_exact(3);
         Ok(pixels.map(|p| p.iter().any(|v| *v > 127)).collect())
+    }
+
+    /// The surface of each pixel.
+    ///
+    /// # Errors
+    /// The device is lost or out of memory.
+    pub fn surfaces(&mut self, base: &Settings, camera: &Camera) -> Result<Vec<Surface>> {
+        let view = |output| Settings {
+            rt_debug: output,
+            rt_accumulate: true,
+            // light is not shown
+            rt_bounces: 0,
+            ..base.clone()
+        };
+        self.renderer.set_settings(&view(DebugOutput::Albedo));
+        let mut mean = Mean::new((self.size.0 * self.size.1) as usize);
+        for _ in 0..ALBEDO_FRAMES {
+            self.frame(camera, 0, &[])?;
+            mean.add(self.picture()?.pixels().chunks_exact(3).map(albedo()));
+        }
+        self.renderer.set_settings(&view(DebugOutput::Depth));
+        self.frame(camera, 0, &[])?;
+        let distances = self.picture()?;
+        let distances = distances.pixels().chunks_exact(3).map(distance);
+        let albedo = mean.texels().into_iter().map(Vec3::from_array);
+        Ok(std::iter::zip(albedo, distances)
+            .map(|(albedo, distance)| Some((relight::overbright::luminance(albedo), distance?)))
+            .collect())
     }
 
     /// The last frame.

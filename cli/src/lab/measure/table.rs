@@ -2,6 +2,8 @@
 
 use serde_json::{Map, Value};
 
+use super::shadows::{BINS, limits};
+
 /// Columns: heading, JSON pointer, factor, decimals.
 const COLUMNS: [(&str, &str, f64, usize); 8] = [
     ("SSIM", "/ssim", 1.0, 4),
@@ -73,6 +75,7 @@ pub fn print(all: &Map<String, Value>) {
             offs.into_iter().reduce(f64::max),
         );
     }
+    print_shadows(all);
     for (place, kinds) in all {
         let number = |name: &str| kinds.get(name).and_then(Value::as_f64);
         if let Some(share) = number("specular_share") {
@@ -85,6 +88,58 @@ pub fn print(all: &Map<String, Value>) {
             println!("{place:<20} brightness of the traced over the classic look {ratio:.2}");
         }
     }
+}
+
+/// The contrast of shadows that each picture keeps, by view distance, of the moving and of the resting camera.
+fn shadows(value: &Value, name: &str) -> Option<[f64; BINS]> {
+    let bins = value.get(name)?.as_array()?;
+    let kept = |bin: usize| bins.get(bin)?.get("kept")?.as_f64();
+    Some(std::array::from_fn(|bin| kept(bin).unwrap_or(f64::NAN)))
+}
+
+fn print_shadows(all: &Map<String, Value>) {
+    print!("{:<20} {:<22}", "shadow contrast %", "units away");
+    for bin in 0..BINS {
+        match limits(bin) {
+            (_, Some(to)) => print!(" {:>9}", format!("to {to}")),
+            (from, None) => print!(" {:>9}", format!("{from} on")),
+        }
+    }
+    println!();
+    let mut sums: Vec<(String, Vec<[f64; BINS]>)> = Vec::new();
+    for (place, kinds) in all {
+        for (kind, value) in kinds.as_object().into_iter().flatten() {
+            for (name, suffix) in [("shadows", ""), ("rest_shadows", ", rest")] {
+                let Some(row) = shadows(value, name) else {
+                    continue;
+                };
+                let name = format!("{kind}{suffix}");
+                shadow_line(place, &name, &row);
+                match sums.iter_mut().find(|(n, _)| *n == name) {
+                    Some((_, rows)) => rows.push(row),
+                    None => sums.push((name, vec![row])),
+                }
+            }
+        }
+    }
+    for (name, rows) in sums {
+        let mean = |bin: usize| {
+            let known = || rows.iter().map(|row| row[bin]).filter(|v| v.is_finite());
+            known().sum::<f64>() / known().count() as f64
+        };
+        shadow_line("mean", &name, &std::array::from_fn(mean));
+    }
+}
+
+fn shadow_line(place: &str, kind: &str, row: &[f64; BINS]) {
+    print!("{place:<20} {kind:<22}");
+    for kept in row {
+        match kept.is_finite() {
+            true => print!(" {:>9.1}", 100.0 * kept),
+            false => print!(" {:>9}", "-"),
+        }
+    }
+    println!();
 }
 
 fn line(place: &str, kind: &str, row: Row, off: Option<f64>) {
