@@ -31,6 +31,7 @@ layout(set = 0, binding = 2, r32f) uniform image2D images_r32f[];
 layout(set = 0, binding = 2, rgba32ui) uniform uimage2D uimages_rgba32ui[];
 layout(set = 0, binding = 2, rg32ui) uniform uimage2D uimages_rg32ui[];
 layout(set = 0, binding = 2, r32ui) uniform uimage2D uimages_r32ui[];
+layout(set = 0, binding = 2, r16ui) uniform uimage2D uimages_r16ui[];
 
 #ifdef BINDLESS_SCENES
 layout(set = 0, binding = 3) uniform accelerationStructureEXT scenes[];

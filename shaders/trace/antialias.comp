@@ -131,8 +131,9 @@ vec3 history_in_current_light(vec3 color, ivec2 pixel, float view_distance) {
             then += light_read(VIEW.antialias.last_light, at);
         }
     }
-    GBufferPixel g = gbuffer_read(pixel);
-    if (g.view_distance < 0.0) return color;
+    if (!is_lit_read(pixel)) return color;
+    GBufferPixel g;
+    shown_read(VIEW.images.shown, pixel, g);
     vec3 ratio = clamp(now / then, 1.0 / MOST_RATIO, MOST_RATIO);
     // half of the light of a checkerboard pixel is from the other field
     if (mark_field(mark_read(pixel)) > 0.0) ratio = mix(vec3(1.0), ratio, 0.5);

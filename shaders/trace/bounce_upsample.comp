@@ -23,7 +23,7 @@ void main() {
         places[i] = vec4(-1.0);
         if (any(lessThan(cell, ivec2(0))) || any(greaterThanEqual(cell, cells))) continue;
         ivec2 pixel = subsample_pixel(cell);
-        places[i] = imageLoad(images_rgba32f[VIEW.images.position], pixel);
+        places[i] = place_read(pixel);
         gathered[i] = uint(pixel.x) | uint(pixel.y) << 16;
         lights[i] = light_read(VIEW.images.indirect, pixel);
         normals[i] = unpack_normal(imageLoad(uimages_rg32ui[VIEW.images.surface], pixel).x);
@@ -36,7 +36,7 @@ void main() {
         ivec2 in_cell = ivec2(i & 1, i >> 1), pixel = cell * CELL + in_cell;
         bool is_own = gathered[own] == (uint(pixel.x) | uint(pixel.y) << 16);
         if (is_own || any(greaterThanEqual(pixel, size))) continue;
-        vec4 position = imageLoad(images_rgba32f[VIEW.images.position], pixel);
+        vec4 position = place_read(pixel);
         vec3 light = vec3(0.0);
         if (position.w >= 0.0) {
             vec3 normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.images.surface], pixel).x);

@@ -39,11 +39,12 @@ struct Shown {
 vec3 radiance_of(Shown s) { return s.is_lit ? s.albedo * s.light + s.front : s.front; }
 
 Shown shown(ivec2 pixel) {
-    GBufferPixel g = gbuffer_read(pixel);
+    GBufferPixel g;
+    shown_read(VIEW.images.shown, pixel, g);
     Shown s;
     // at the map's base exposure, self-luminous surfaces, sky and fog show as in the engine
     s.front = g.front * exp2(-VIEW.exposure.base);
-    s.is_lit = g.view_distance >= 0.0;
+    s.is_lit = is_lit_read(pixel);
     s.albedo = g.albedo;
     s.light = s.is_lit ? light_of(pixel) : vec3(0.0);
     return s;

@@ -16,7 +16,7 @@ shared float depths[(TILE + 2) * (TILE + 2)];
 
 float depth_at(ivec2 pixel) {
     if (!inside(pixel)) return 0.0;
-    float view_distance = imageLoad(images_rgba32f[VIEW.images.position], pixel).w;
+    float view_distance = lit_distance_read(pixel, distance_tail_read(pixel));
     return view_distance < 0.0 ? 0.0 : max(depth_of(pixel, view_distance), 1.0e-3);
 }
 

@@ -48,7 +48,7 @@ void fog_keep(vec3 weight, vec2 range, vec3 origin, vec3 direction, float travel
     fog_distance = travelled + t;
 }
 
-// Writes the selected point for the passes that light it.
+// Writes the selected point for the passes that light it, where its light will be.
 void fog_write(ivec2 pixel) {
     bool filtered = (VIEW.fog.flags & FOG_FILTERED) != 0;
     // filtered light has no colour of its own, and the sum over the path has no noise
@@ -58,7 +58,7 @@ void fog_write(ivec2 pixel) {
     ivec2 at = pixel / cell;
     // each pixel of a cell in turn; relative to the camera, where half floats are most precise
     ivec2 sampled = min(at * cell + ivec2(VIEW.seed, VIEW.seed >> 1) % cell, ivec2(VIEW.width, VIEW.height) - 1);
-    if (pixel == sampled) imageStore(images_rgba16f[VIEW.fog.point], at, vec4(clamp(fog_point - VIEW.camera.origin, -60000.0, 60000.0), min(fog_distance, 60000.0)));
+    if (pixel == sampled) imageStore(images_rgba16f[VIEW.fog.fresh], at, vec4(clamp(fog_point - VIEW.camera.origin, -60000.0, 60000.0), min(fog_distance, 60000.0)));
 }
 
 #endif

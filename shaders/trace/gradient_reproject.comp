@@ -10,7 +10,7 @@ const float REACH = 1.0;
 
 // Whether the sample lies on the surface that the pixel shows. `moved`: the surface has moved since.
 bool same_surface(LitSample s, ivec2 pixel, float last_view_distance, out bool moved) {
-    vec4 position = imageLoad(images_rgba32f[VIEW.images.position], pixel);
+    vec4 position = place_read(pixel);
     moved = false;
     if (position.w < 0.0) return false;
     vec3 face_normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.images.surface], pixel).x);
@@ -28,7 +28,7 @@ void main() {
     if (!inside(first)) return;
 
     ivec2 middle = min(first + 1, ivec2(VIEW.width, VIEW.height) - 1);
-    float view_distance = imageLoad(images_rgba32f[VIEW.images.position], middle).w;
+    float view_distance = lit_distance_read(middle, distance_tail_read(middle));
     uint guide = 0;
     if (view_distance >= 0.0) guide = pack_guide(depth_of(middle, view_distance), unpack_normal(imageLoad(uimages_rg32ui[VIEW.images.surface], middle).x), false);
     imageStore(uimages_r32ui[DENOISE.stratum_guide], stratum, uvec4(guide));

@@ -53,9 +53,16 @@ struct LitSample {
 
 void keep_nothing(ivec2 stratum) { imageStore(uimages_rgba32ui[DENOISE.samples], stratum, uvec4(NO_GRADIENT_PIXEL)); }
 
-void keep_sample(ivec2 stratum, ivec2 pixel, vec4 position, uvec2 normals, vec2 light) {
-    imageStore(uimages_rgba32ui[DENOISE.samples], stratum, uvec4(floatBitsToUint(position.xyz), pack_place(pixel)));
-    imageStore(uimages_rgba32ui[DENOISE.sample_surfaces], stratum, uvec4(normals, packHalf2x16(light), floatBitsToUint(position.w)));
+// The lowest bit of the view distance, a ten-millionth of its value, holds whether the surface is of the first-person
+// view.
+bool first_person_of(float packed) { return (floatBitsToUint(packed) & 1u) != 0; }
+
+void keep_sample(ivec2 stratum, ivec2 pixel, uvec2 normals, vec2 light) {
+    uint tail = distance_tail_read(pixel);
+    vec4 place = place_read(pixel, tail);
+    uint view_distance = floatBitsToUint(place.w) & ~1u | ((tail & TAIL_FIRST_PERSON) != 0 ? 1u : 0u);
+    imageStore(uimages_rgba32ui[DENOISE.samples], stratum, uvec4(floatBitsToUint(place.xyz), pack_place(pixel)));
+    imageStore(uimages_rgba32ui[DENOISE.sample_surfaces], stratum, uvec4(normals, packHalf2x16(light), view_distance));
 }
 
 LitSample kept_sample(ivec2 stratum) {

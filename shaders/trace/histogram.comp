@@ -4,12 +4,13 @@
 // theirs.
 #include "trace/exposure.glsl"
 #include "trace/picture.glsl"
+#include "trace/view_distance.glsl"
 
 layout(local_size_x = 16, local_size_y = 16) in;
 
 bool shows_surface(ivec2 pixel) {
     vec2 traced = (vec2(pixel) + 0.5) * vec2(VIEW.width, VIEW.height) / vec2(picture_size());
-    return imageLoad(images_rgba32f[VIEW.images.position], ivec2(traced)).w >= 0.0;
+    return is_lit_read(ivec2(traced));
 }
 
 shared uint counts[EXPOSURE_BINS];

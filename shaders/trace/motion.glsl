@@ -10,9 +10,7 @@
 
 #include "trace/camera.glsl"
 #include "trace/geometry.glsl"
-
-// View distance of the sky in the motion image: beyond every map, within half floats.
-const float SKY_DISTANCE = 60000.0;
+#include "trace/view_distance.glsl"
 
 // Least offset of a surface that moves, pixels; 0 is reserved for surfaces at rest.
 const float LEAST_OFFSET = 1.0e-3;
@@ -43,12 +41,6 @@ float mark_of(uint field, bool bent, float new_part) { return float(field + (ben
 bool mark_bent(float mark) { return mark >= 3.0; }
 float mark_field(float mark) { return floor(mark) - (mark_bent(mark) ? 3.0 : 0.0); }
 float mark_new_part(float mark) { return (mark - floor(mark)) * MOST_FRESH; }
-
-// View distance of the pixel's surface; `SKY_DISTANCE`: the sky.
-float view_distance_read(ivec2 pixel) { return abs(imageLoad(images_r16f[VIEW.motion.view_distance], pixel).x); }
-
-// View distance of the pixel's surface in the last frame; negative if the surface moved in the picture then.
-float last_view_distance_read(ivec2 pixel) { return imageLoad(images_r16f[VIEW.motion.last_view_distance], pixel).x; }
 
 // Map from world space to the virtual space of the last frame's camera: x is seen at linear * x + translation.
 struct LastSpace {
@@ -134,8 +126,9 @@ vec4 motion_of(CameraRay ray, LastPlace place) {
 // `motion`: result of `motion_of`.
 void motion_write(ivec2 pixel, vec4 motion, float mark) {
     imageStore(images_rgba16f[VIEW.images.motion], pixel, vec4(motion.xyz, mark));
-    bool rests = motion.xy == vec2(0.0) && motion.z >= 0.0;
-    imageStore(images_r16f[VIEW.motion.view_distance], pixel, vec4(rests ? motion.w : -motion.w));
 }
+
+// Whether a surface of this motion rests in the picture.
+bool rests_in_picture(vec4 motion) { return motion.xy == vec2(0.0) && motion.z >= 0.0; }
 
 #endif

@@ -168,7 +168,7 @@ void main() {
 
     if (kept) {
         if ((choice & GATHERED) == 0) luminances.y = -1.0;
-        keep_sample(stratum, pixel, imageLoad(images_rgba32f[VIEW.images.position], pixel), surface, luminances);
+        keep_sample(stratum, pixel, surface, luminances);
     }
 
     History h = history_at(pixel, light.guide, depth_gradient);

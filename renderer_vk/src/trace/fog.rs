@@ -25,12 +25,10 @@ struct Images {
     cell: u32,
     cells: [u32; 2],
     weight: Image,
-    /// Points in fog.
-    points: Image,
-    /// Light at the points, of this frame and the last; one image where earlier frames do not count.
+    /// Light at the points in fog, of this frame and the last; one image where earlier frames do not count. This frame's
+    /// holds the points before they are lit.
     light: [Image; 2],
-    /// Filtered light.
-    filtered: Option<Image>,
+    filtered: bool,
 }
 
 impl Images {
@@ -42,21 +40,15 @@ impl Images {
             Image::new(device, &ImageDesc::new(name, width, height, format, usage))
         };
         let light = make("trace fog light", cells, Format::Rgba16F)?;
-        let (last_light, filtered) = if filtered {
-            let last = make("trace last fog light", cells, Format::Rgba16F)?;
-            (
-                last,
-                Some(make("trace fog filtered", cells, Format::Rgba16F)?),
-            )
-        } else {
-            (light.clone(), None)
+        let last_light = match filtered {
+            true => make("trace last fog light", cells, Format::Rgba16F)?,
+            false => light.clone(),
         };
         Ok(Self {
             size,
             cell,
             cells,
             weight: make("trace fog weight", size, Format::R32Uint)?,
-            points: make("trace fog points", cells, Format::Rgba16F)?,
             light: [light, last_light],
             filtered,
         })
@@ -96,7 +88,7 @@ impl LitFog {
         size: [u32; 2],
         goes_on: bool,
     ) -> Result<(), Error> {
-        let had = self.images.as_ref().map(|i| (i.size, i.filtered.is_some()));
+        let had = self.images.as_ref().map(|i| (i.size, i.filtered));
         self.unseen = if wanted {
             0
         } else {
@@ -124,14 +116,13 @@ impl LitFog {
         self.images.as_ref().filter(|_| self.unseen == 0)
     }
 
-    /// Parameters of the passes. `packed`, an image of packed light, and `half`, an image of half floats, stand for
-    /// absent images, because software drivers access the images of branches that are not taken.
-    pub fn view(&self, packed: &Image, half: &Image) -> FogView {
-        let half = half.storage_index();
+    /// Parameters of the passes. `filtered`: the image of filtered light. It and `packed`, an image of packed light,
+    /// stand for absent images, because software drivers access the images of branches that are not taken.
+    pub fn view(&self, packed: &Image, filtered: &Image) -> FogView {
+        let half = filtered.storage_index();
         let Some(images) = self.seen() else {
             return FogView {
                 weight: packed.storage_index(),
-                point: half,
                 fresh: half,
                 last: half,
                 filtered: half,
@@ -143,16 +134,15 @@ impl LitFog {
         let [fresh, last] = [0, 1].map(|i| images.light[i].storage_index());
         FogView {
             weight: images.weight.storage_index(),
-            point: images.points.storage_index(),
             fresh,
             last,
-            filtered: images.filtered.as_ref().map_or(fresh, Image::storage_index),
+            filtered: if images.filtered { half } else { fresh },
             cell: images.cell,
             width: images.cells[0],
             height: images.cells[1],
             flags: t::FOG_LIT
-                | flag(images.filtered.is_some(), t::FOG_FILTERED)
-                | flag(self.history && images.filtered.is_some(), t::FOG_HISTORY),
+                | flag(images.filtered, t::FOG_FILTERED)
+                | flag(self.history && images.filtered, t::FOG_HISTORY),
         }
     }
 
@@ -161,18 +151,18 @@ impl LitFog {
         self.seen().map_or([0; 2], |images| images.cells)
     }
 
-    /// Lights the fog in view, and filters that light if the picture is denoised.
+    /// Lights the fog in view, and filters that light into the image `filtered` if the picture is denoised.
     ///
     /// # Errors
     /// Out of memory, or the driver refuses a pipeline.
-    pub fn record(&self, passes: &mut FramePasses<'_>) -> Result<(), Error> {
+    pub fn record(&self, passes: &mut FramePasses<'_>, filtered: &Image) -> Result<(), Error> {
         let Some(images) = self.seen() else {
             return Ok(());
         };
         passes.run(Pass::FogLight)?;
-        let Some(filtered) = &images.filtered else {
+        if !images.filtered {
             return Ok(());
-        };
+        }
         let [fresh, last, filtered] = [&images.light[0], &images.light[1], filtered]
             .map(|image| u64::from(image.storage_index()));
         // the fresh light is the next frame's history; the last frame's image is free

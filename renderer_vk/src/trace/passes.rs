@@ -62,15 +62,19 @@ pub enum Resource {
     Lights,
     /// First hits of the camera's rays.
     PrimaryHits,
-    /// Position, motion and view distance of the surface that a pixel shows.
+    /// Motion and view distance of the surface that a pixel shows.
     GBuffer,
+    /// Its position.
+    Positions,
     /// Its normals.
     Normals,
     /// Albedo of that surface, and the radiance in front of it.
     Shown,
     /// The same for the alternate side of a reflecting or transparent surface.
     Other,
-    /// Points in fog to be lit, and the weight of their light.
+    /// Weight of the light in fog.
+    FogWeights,
+    /// Points in fog to be lit.
     FogPoints,
     /// Visibility of flares.
     FlareStates,
@@ -133,6 +137,8 @@ impl Resource {
             Self::Past => Self::IndirectLight,
             Self::DepthGradient => Self::DirectLight,
             Self::Normals => Self::Picture,
+            Self::FogPoints => Self::FogLight,
+            Self::FilteredFogLight => Self::Positions,
             Self::Other => Self::ResolvedPicture,
             other => other,
         }
@@ -214,14 +220,14 @@ passes! {
     PrimarySimple = "trace_primary_simple", Compute(&shaders::TRACE_PRIMARY_RGEN_NO_RAYS), Traced {
         switch: Some((ids::fog_keep::LIT_FOG, LitFog)),
         reads: &[Scene, PrimaryHits],
-        writes: &[GBuffer, Normals, Shown, FogPoints],
+        writes: &[GBuffer, Positions, Normals, Shown, FogWeights, FogPoints],
     }
     /// The surface that each other pixel shows behind mirrors, portals, glass and liquids, with the layers in front of
     /// it.
     Primary = "trace_primary", Rays(&shaders::TRACE_PRIMARY), Traced {
         switch: Some((ids::fog_keep::LIT_FOG, LitFog)),
         reads: &[Scene, PrimaryHits],
-        writes: &[GBuffer, Normals, Shown, FogPoints],
+        writes: &[GBuffer, Positions, Normals, Shown, FogWeights, FogPoints],
         counter: Some(t::COUNT_PRIMARY),
     }
     /// The side of glass or of a glossy surface that a pixel does not show.
@@ -238,19 +244,19 @@ passes! {
     }
     /// Finds in each stratum a surface of the last frame, which is then shaded again with its old random numbers.
     GradientReproject = "trace_gradient_reproject", Compute(&shaders::TRACE_GRADIENT_REPROJECT_COMP), Strata {
-        reads: &[GBuffer, Normals],
+        reads: &[GBuffer, Positions, Normals],
         writes: &[GradientPixels],
     }
     /// Samples one light for each pixel, and sorts the rays of a tile by direction.
     SampleLights = "trace_sample_lights", Compute(&shaders::TRACE_SAMPLE_LIGHTS_COMP), Traced {
-        reads: &[Lights, GBuffer, Normals],
+        reads: &[Lights, GBuffer, Positions, Normals],
         may_read: &[GradientPixels],
         writes: &[SampledLights],
     }
     /// Shadow rays to the sampled lights.
     SampledDirect = "trace_direct", Rays(&shaders::TRACE_DIRECT), RayTiles {
         constants: &[(ids::direct::SAMPLING, t::SAMPLING_LIGHT)],
-        reads: &[Scene, Lights, GBuffer, Normals, SampledLights],
+        reads: &[Scene, Lights, GBuffer, Positions, Normals, SampledLights],
         may_read: &[GradientPixels],
         writes: &[DirectLight],
         counter: Some(t::COUNT_DIRECT),
@@ -258,21 +264,21 @@ passes! {
     /// Shadow rays to suns, whose light is added.
     Suns = "trace_suns", Rays(&shaders::TRACE_DIRECT), RayTiles {
         constants: &[(ids::direct::SAMPLING, t::SAMPLING_SUNS)],
-        reads: &[Scene, Lights, GBuffer, Normals, SampledLights, DirectLight],
+        reads: &[Scene, Lights, GBuffer, Positions, Normals, SampledLights, DirectLight],
         may_read: &[GradientPixels],
         writes: &[DirectLight],
         counter: Some(t::COUNT_SUNS),
     }
     /// Direct light where a pixel samples several lights or all.
     Direct = "trace_direct", Rays(&shaders::TRACE_DIRECT), Traced {
-        reads: &[Scene, Lights, GBuffer, Normals],
+        reads: &[Scene, Lights, GBuffer, Positions, Normals],
         may_read: &[GradientPixels],
         writes: &[DirectLight],
         counter: Some(t::COUNT_DIRECT),
     }
     /// Rays of a bounce.
     BounceRays = "trace_bounce_rays", Rays(&shaders::TRACE_BOUNCE_RAYS), Cells {
-        reads: &[Scene, GBuffer, Normals],
+        reads: &[Scene, GBuffer, Positions, Normals],
         may_read: &[GradientPixels, BounceLights],
         writes: &[BounceHits],
         counter: Some(t::COUNT_BOUNCE_RAYS),
@@ -280,20 +286,20 @@ passes! {
     /// Shades what they hit, and samples a light for it.
     BounceShade = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
         switch: Some((ids::bounce::HAS_FOG, MapFog)),
-        reads: &[Scene, Lights, GBuffer, Normals, BounceHits],
+        reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
         may_read: &[GradientPixels],
         writes: &[BounceLights],
     }
     /// Shadow rays to those lights.
     BounceLight = "trace_bounce_light", Rays(&shaders::TRACE_BOUNCE_LIGHT), Cells {
-        reads: &[Scene, Lights, GBuffer, Normals, BounceLights],
+        reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceLights],
         may_read: &[GradientPixels],
         writes: &[IndirectLight],
         counter: Some(t::COUNT_BOUNCE_LIGHT),
     }
     /// Interpolates bounced light to the pixels that did not gather it.
     BounceUpsample = "trace_bounce_upsample", Compute(&shaders::TRACE_BOUNCE_UPSAMPLE_COMP), Cells {
-        reads: &[GBuffer, Normals, IndirectLight],
+        reads: &[GBuffer, Positions, Normals, IndirectLight],
         may_read: &[GradientPixels],
         writes: &[IndirectLight],
     }
@@ -304,7 +310,7 @@ passes! {
     }
     /// A step of the filter of that light.
     FogFilter = "trace_fog_filter", Compute(&shaders::TRACE_FOG_FILTER_COMP), FogCells {
-        reads: &[FogPoints, FogLight],
+        reads: &[FogWeights, FogLight],
         writes: &[FilteredFogLight],
     }
     /// Change of the light of each gradient pixel.
@@ -325,7 +331,7 @@ passes! {
     /// A-SVGF: joins the light with that of earlier frames.
     Temporal = "trace_temporal", Compute(&shaders::TRACE_TEMPORAL_COMP), Traced {
         switch: Some((ids::temporal::BOUNCES, Bounces)),
-        reads: &[GBuffer, Normals, DirectLight, IndirectLight],
+        reads: &[GBuffer, Positions, Normals, DirectLight, IndirectLight],
         may_read: &[GradientPixels, Gradients],
         writes: &[FreshLight, DepthGradient, Past],
     }
@@ -363,7 +369,7 @@ passes! {
     /// The linear picture; in reference mode the mean over frames.
     Composite = "trace_composite", Compute(&shaders::TRACE_COMPOSITE_COMP), Traced {
         reads: &[GBuffer, Shown, DirectLight],
-        may_read: &[IndirectLight, Other, FogPoints, FogLight, FilteredFogLight, Gradients],
+        may_read: &[IndirectLight, Other, FogWeights, FogLight, FilteredFogLight, Gradients],
         writes: &[Picture],
     }
     /// Temporal antialiasing, and upscaling with it.
@@ -413,7 +419,7 @@ passes! {
     /// An intermediate result in place of the picture (`rt_debug`).
     Debug = "trace_debug", Compute(&shaders::TRACE_DEBUG_COMP), Output {
         reads: &[GBuffer, Picture],
-        may_read: &[Normals, Shown, Other, Gradients, DirectLight, IndirectLight, Past],
+        may_read: &[Positions, Normals, Shown, Other, Gradients, DirectLight, IndirectLight, Past],
         writes: &[Target],
     }
 }

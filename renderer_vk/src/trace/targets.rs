@@ -41,6 +41,8 @@ pub struct OwnImages {
     pub indirect: bool,
     /// `Targets::composite`; otherwise it is in the memory of `surface`.
     pub composite: bool,
+    /// `Targets::fog`; otherwise it is in the memory of `position`.
+    pub fog: bool,
 }
 
 /// Images of one size: the G-buffer, light, the picture before tone mapping, and the accumulated mean.
@@ -55,10 +57,12 @@ pub struct Targets {
     /// 16 bytes a pixel that passes use in turns: primary hits, then sampled lights, then light that the denoiser
     /// filters.
     pub scratch: Buffer,
-    /// `Rgba32F`: world position of the shown surface, and its view distance (negative: no surface to light; its lowest
-    /// bit is set if only camera rays see the surface). Written by `primary_simple` and `primary`, read by all passes
-    /// that light or filter.
+    /// `Rg32Uint`: world position of the shown surface, relative to the ray through the pixel (`gbuffer.glsl`). Written
+    /// by `primary_simple` and `primary`, read by all passes that light, and last by the first pass of the denoiser.
     pub position: Image,
+    /// `Rgba16F`: filtered light in fog, in the memory of `position` unless a debug output shows positions afterwards.
+    /// The cells of the light are fewer than the pixels and fill a corner.
+    pub fog: Image,
     /// `Rg32Uint`: geometric normal and shading normal, packed (`direction.glsl`). Written as `position` is, and read
     /// until the denoiser has joined the light with its history; `composite` then overwrites it.
     pub surface: Image,
@@ -73,8 +77,12 @@ pub struct Targets {
     /// frame (negative: unknown), and the pixel's mark (`motion.glsl`). Read by the denoiser and by temporal
     /// antialiasing.
     pub motion: Image,
-    /// `R16F`: view distance in this frame and in the last; negative where the surface moves in the picture.
+    /// `R16F`: view distance in this frame and in the last, without the lower bits; negative where the surface moves in
+    /// the picture.
     pub view_distance: [Image; 2],
+    /// `R16Uint`: the lower bits of this frame's view distance; whether the pixel shows a surface to light, and one that
+    /// only camera rays see (`view_distance.glsl`).
+    pub distance_tail: Image,
     /// `R32Uint`, light: direct light of lamps and suns, without albedo; of this frame and the last. Written by
     /// `direct` and `suns`; the denoiser replaces it with the filtered light for `composite`.
     pub direct: [Image; 2],
@@ -109,6 +117,7 @@ impl Targets {
             let image = Image::new(device, &desc)?;
             Ok((image.clone(), image.in_other_format()?))
         };
+        let (position, fog) = shared("trace position", Format::Rg32Uint, Format::Rgba16F)?;
         let (surface, composite) = shared("trace surface", Format::Rg32Uint, Format::Rgba16F)?;
         let (direct, depth_gradient) = shared("trace direct", Format::R32Uint, Format::Rg16F)?;
         let (last_direct, last_depth_gradient) =
@@ -122,7 +131,8 @@ impl Targets {
                 size.map(|n| n.next_multiple_of(RAY_TILE)),
                 16,
             )?,
-            position: make("trace position", Format::Rgba32F)?,
+            position,
+            fog,
             surface,
             shown: make("trace shown", Format::Rg32Uint)?,
             other: None,
@@ -131,6 +141,7 @@ impl Targets {
                 make("trace path", Format::R16F)?,
                 make("trace last path", Format::R16F)?,
             ],
+            distance_tail: make("trace path tail", Format::R16Uint)?,
             direct: [direct, last_direct],
             depth_gradient: [depth_gradient, last_depth_gradient],
             indirect: None,
@@ -170,14 +181,23 @@ impl Targets {
             "trace indirect",
             Format::R32Uint,
         )?;
-        let shares = self.composite.owner().storage_index() == self.surface.storage_index();
-        if shares == own.composite {
-            self.composite = match own.composite {
-                true => make("trace composite", Format::Rgba16F)?,
-                false => self.surface.in_other_format()?,
-            };
-        }
-        Ok(())
+        let share = |image: &mut Image, owner: &Image, apart: bool, name| {
+            let shares = image.owner().storage_index() == owner.storage_index();
+            if shares == apart {
+                *image = match apart {
+                    true => make(name, Format::Rgba16F)?,
+                    false => owner.in_other_format()?,
+                };
+            }
+            Ok::<(), Error>(())
+        };
+        share(
+            &mut self.composite,
+            &self.surface,
+            own.composite,
+            "trace composite",
+        )?;
+        share(&mut self.fog, &self.position, own.fog, "trace fog filtered")
     }
 
     /// The linear picture before temporal antialiasing.

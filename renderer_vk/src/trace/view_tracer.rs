@@ -84,7 +84,7 @@ pub struct ViewTracer {
     frame: u32,
     last_time: f32,
     /// Camera of the last frame, if its light is valid history.
-    history: Option<CameraView>,
+    pub(super) history: Option<CameraView>,
     /// Hash of the content of the accumulated frames, and their number.
     accumulated: (u64, u32),
 }
@@ -329,9 +329,10 @@ impl ViewTracer {
         } else {
             clear_indirect(targets, passes)?;
         }
-        self.fog.record(passes)?;
-        self.counters.end(passes.rec)?;
         self.denoiser.filter(passes, &targets.scratch)?;
+        // after the denoiser, which is the last to read the positions that the filtered light overwrites
+        self.fog.record(passes, &targets.fog)?;
+        self.counters.end(passes.rec)?;
         passes.run(Pass::Composite)?;
         self.antialias.record(passes)?;
         passes.run(Pass::Histogram)?;
@@ -410,6 +411,7 @@ fn own_images(settings: &Settings, output: [u32; 2]) -> OwnImages {
         other: !settings.rt_accumulate && (shows_steps || !resolves),
         indirect: denoise::in_use(settings) != DenoiserChoice::ASvgf,
         composite: shows_steps,
+        fog: shows_steps,
     }
 }
 

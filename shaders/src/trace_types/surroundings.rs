@@ -77,9 +77,8 @@ pub struct FlareView {
 pub struct FogView {
     /// Factor of the fog's light, per pixel.
     pub weight: u32,
-    /// Selected point in fog and its distance along the path, per cell.
-    pub point: u32,
-    /// Light at these points, and the number of frames in its mean.
+    /// Per cell: selected point in fog and its distance along the path; then, in its place, the light at this point, and
+    /// the number of frames in its mean.
     pub fresh: u32,
     /// `fresh` of the last frame.
     pub last: u32,

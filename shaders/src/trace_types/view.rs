@@ -66,8 +66,10 @@ pub struct SceneView {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ImageView {
-    /// RGBA32F: position, and view distance (negative: nothing to light).
+    /// RG32UI: position relative to the ray through the pixel (`gbuffer.glsl`).
     pub position: u32,
+    /// R16UI: lower bits of the view distance, and flags (`view_distance.glsl`).
+    pub distance_tail: u32,
     /// RG32UI: packed normals of triangle and shading.
     pub surface: u32,
     /// RG32UI: albedo, and radiance in front of the surface.

@@ -73,7 +73,7 @@ impl ViewTracer {
             exposure: self.exposure_view(traced),
             post: prepared.post,
             antialias: prepared.antialias,
-            fog: self.fog.view(&targets.direct[0], &targets.composite),
+            fog: self.fog.view(&targets.direct[0], &targets.fog),
             images: self.image_view(targets),
             target: self.target_view(traced),
             camera: camera_view(traced, targets.height),
@@ -155,6 +155,7 @@ impl ViewTracer {
             .unwrap_or(&targets.direct[0]);
         ImageView {
             position: targets.position.storage_index(),
+            distance_tail: targets.distance_tail.storage_index(),
             surface: targets.surface.storage_index(),
             shown: targets.shown.storage_index(),
             other: other.storage_index(),

@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::Vec3;
+use shaders::trace_types::CameraView;
 use testkit::Need;
 
 use super::half;
@@ -300,15 +301,23 @@ impl Gpu {
     pub fn motion(&self) -> Vec<([f32; 4], [f32; 4])> {
         let targets = self.look.targets.as_ref().expect("traced");
         let read = |image| self.device.read_image(image).expect("read");
-        let places: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&read(&targets.position));
+        let away: Vec<[u32; 2]> = bytemuck::pod_collect_to_vec(&read(&targets.position));
+        let tails: Vec<u16> = bytemuck::pod_collect_to_vec(&read(&targets.distance_tail));
+        let camera = self.look.history.expect("not a reference picture");
         let halves: Vec<[u16; 4]> = bytemuck::pod_collect_to_vec(&read(&targets.motion));
         let paths: Vec<u16> = bytemuck::pod_collect_to_vec(&read(&targets.view_distance[1]));
-        let motions = halves.iter().zip(paths).map(|(motion, path)| {
+        let motions = halves.iter().zip(&paths).map(|(motion, path)| {
             let [x, y, last, _mark] = motion.map(half);
             // the sign marks static surfaces
-            [x, y, last, half(path).abs()]
+            [x, y, last, half(*path).abs()]
         });
-        places.into_iter().zip(motions).collect()
+        let places = away.into_iter().zip(tails.iter().zip(&paths)).enumerate();
+        let places = places.map(|(i, (away, (tail, path)))| {
+            let (x, y) = (i as u32 % targets.width, i as u32 / targets.width);
+            let size = [targets.width, targets.height];
+            place(&camera, [x, y], size, away, half(*path), *tail)
+        });
+        places.zip(motions).collect()
     }
 
     /// Asserts that the validation layer is silent.
@@ -326,4 +335,28 @@ impl Gpu {
         let (pixels, _) = self.render(scene, settings, frames);
         pixels.iter().sum::<Vec3>() / pixels.len() as f32
     }
+}
+
+/// Position and view distance of a pixel's surface, as `gbuffer.glsl` reads them: relative to the ray through the pixel.
+fn place(
+    camera: &CameraView,
+    pixel: [u32; 2],
+    size: [u32; 2],
+    away: [u32; 2],
+    distance: f32,
+    tail: u16,
+) -> [f32; 4] {
+    let lit = tail & 1 << 13 != 0;
+    if !lit {
+        return [0.0, 0.0, 0.0, -1.0];
+    }
+    let distance = f32::from_bits(distance.abs().to_bits() | u32::from(tail) & 0x1FFF);
+    let [x, y] = [0, 1].map(|i| (pixel[i] as f32 + 0.5) / size[i] as f32 * 2.0 - 1.0);
+    let ray = (camera.forward - camera.left * x - camera.up * y).normalize();
+    let [low, high] = away;
+    let steps = [low & 0xF_FFFF, low >> 20 | (high & 0xFF) << 12, high >> 8 & 0xF_FFFF];
+    let step = ((high >> 28) as f32 + 3.0 - 19.0).exp2();
+    let away = Vec3::from(steps.map(|n| (n as f32 - (1 << 19) as f32) * step));
+    let place = camera.origin + ray * distance + away;
+    [place.x, place.y, place.z, distance]
 }
