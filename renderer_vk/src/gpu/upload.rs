@@ -19,6 +19,8 @@ use super::image::{Image, layout_change, rectangle};
 const CHUNK: u64 = 4 << 20;
 /// Number of staging buffers kept between frames, for video pictures.
 const SPARE: usize = 3;
+/// Submissions without uploads after which the kept ones are freed: two seconds of a game that plays no video.
+const IDLE: u32 = 120;
 /// Staged bytes above which uploads are submitted without waiting for a frame.
 const FLUSH: u64 = 96 << 20;
 
@@ -71,6 +73,8 @@ pub(crate) struct Pending {
     staging: Vec<(vk::Buffer, Allocation)>,
     /// Unused staging buffers.
     spare: Vec<(vk::Buffer, Allocation)>,
+    /// Submissions since the last one that staged something.
+    idle: u32,
     /// Targets written so far during recording.
     seen: Seen,
     /// Used bytes of the last staging buffer.
@@ -129,6 +133,18 @@ impl Pending {
         }
         self.spare.push((buffer, memory));
         None
+    }
+
+    /// Counts a submission that staged so many bytes. Removes the spare buffers if none was needed for long.
+    fn count(&mut self, staged: u64) -> Vec<(vk::Buffer, Allocation)> {
+        self.idle = match staged {
+            0 => self.idle.saturating_add(1),
+            _ => 0,
+        };
+        match self.idle {
+            IDLE.. => self.take_spare(),
+            _ => Vec::new(),
+        }
     }
 
     /// Copies `bytes` into staging memory.
@@ -309,6 +325,9 @@ impl DeviceInner {
     /// if the submission failed, its uploads wait for the next one: they belong to objects that stay.
     pub fn put_back(&self, mut recorded: Pending, submitted: bool) {
         if submitted {
+            for (buffer, memory) in recorded.count(recorded.staged) {
+                self.bury(Garbage::Buffer(buffer, memory));
+            }
             for (buffer, memory) in recorded.staging.drain(..) {
                 self.bury(Garbage::Staging(buffer, memory));
             }
