@@ -168,7 +168,9 @@ impl Renderer {
         let show = end && !self.hidden && self.swapchain.is_some();
         if !self.queue.is_empty() {
             let format = self.picture_format();
-            self.targets.fit(&self.device, &self.settings, format)?;
+            let shared = self.trace.as_ref().and_then(|trace| trace.depth());
+            self.targets
+                .fit(&self.device, &self.settings, format, shared)?;
         }
         let begin = Instant::now();
         let mut recorder = self.ring.begin()?;

@@ -58,7 +58,9 @@ impl Renderer {
     /// Draws all registered materials once, invisibly.
     fn warm_up(&mut self) -> Result<(), Error> {
         let format = self.picture_format();
-        self.targets.fit(&self.device, &self.settings, format)?;
+        let shared = self.trace.as_ref().and_then(|trace| trace.depth());
+        self.targets
+            .fit(&self.device, &self.settings, format, shared)?;
         let Some(assets) = &mut self.assets else {
             return Ok(());
         };

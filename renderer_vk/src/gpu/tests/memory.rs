@@ -283,3 +283,52 @@ fn texels_are_the_same_in_another_format() {
     assert_eq!(plain.owner().storage_index(), plain.storage_index());
     finish(device);
 }
+
+#[test]
+fn a_depth_image_shares_the_memory_of_a_buffer() {
+    let Some(device) = device(true) else { return };
+    let buffer = BufferDesc {
+        name: "texels",
+        size: 16 * 40 * 30,
+        usage: BufferUsage::STORAGE,
+        memory: Memory::Device,
+    };
+    let format = device.depth_format(false);
+    let desc = ImageDesc::new("depth", 40, 30, format, ImageUsage::DEPTH);
+    let before = device.memory_report().allocations;
+    let (buffer, depth) = Image::in_memory_of(&device, &buffer, &desc).unwrap();
+    assert_eq!(device.memory_report().allocations, before + 1);
+    let Some(depth) = depth else { return };
+    assert!(depth.shares_memory() && depth.is(&depth.clone()));
+    for value in [1.0, 0.25] {
+        // the buffer's bytes destroy the depths, a clear restores them
+        let bytes = [0xA5; 16 * 40 * 30];
+        device.upload_buffer(&buffer, 0, &bytes).unwrap();
+        device
+            .immediate(|recorder| {
+                let mut pass = recorder.pass("renew", Access::TRANSFER, Access::TRANSFER)?;
+                pass.renew_depth(&depth, value);
+                Ok(())
+            })
+            .unwrap();
+        let texels: Vec<u32> = collect(&device.read_image(&depth).unwrap());
+        let wanted = match format {
+            Format::D24 => (value * 16_777_215.0).round() as u32,
+            _ => value.to_bits(),
+        };
+        assert_eq!(texels.len(), 40 * 30);
+        assert!(
+            texels
+                .iter()
+                .all(|t| (t & 0xFF_FFFF) == (wanted & 0xFF_FFFF))
+        );
+    }
+    // the memory lives as long as one of both
+    drop(buffer);
+    device.wait_idle().unwrap();
+    assert_eq!(device.memory_report().allocations, before + 1);
+    drop(depth);
+    device.wait_idle().unwrap();
+    assert_eq!(device.memory_report().allocations, before);
+    finish(device);
+}
