@@ -12,7 +12,8 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(constant_id = 0) const uint BOUNCES = 1;
 // 1: the variance is averaged over the taps, because the variance of fresh light is itself noisy.
 layout(constant_id = 1) const uint NOISY_VARIANCE = 1;
-// 1: last step; writes the sum of direct and indirect light to the image of direct light.
+// 1: last step; writes the sum of direct and indirect light to the image of direct light, and the number of frames and
+// the variance of the fresh light into the history, whose own variance has served.
 layout(constant_id = 2) const uint LAST = 0;
 
 // Luminance tolerance in standard deviations, of direct and indirect light.
@@ -98,6 +99,7 @@ void main() {
     if (LAST != 0) {
         vec3 light = light_of_texel(mean.level.x + mean.level.y, mean.green.x + mean.green.y, mean.red.x + mean.red.y);
         light_write(VIEW.images.direct, pixel, light, dither(pixel, DITHER_FILTERED));
+        LightTexels(DENOISE.history).at[place].z = imageLoad(uimages_r32ui[DENOISE.past], pixel).x;
         return;
     }
     // the taps have similar surfaces and are taken to have the same variance

@@ -40,13 +40,12 @@ void add_tap(inout History h, ivec2 tap, vec3 normal, vec2 range, float weight) 
     vec3 bend = guide_components(texel.w) - normal;
     // the inverse depth of a pixel without a surface is 0
     if (inverse < range.x || inverse > range.y || dot(bend, bend) > MAX_NORMAL_DIFFERENCE) return;
-    uint past = imageLoad(uimages_r32ui[DENOISE.last_past], tap).x;
     vec2 level = unpackHalf2x16(texel.x) * weight;
     h.light.level += level;
     h.light.green += green_code(texel.y) * level;
     h.light.red += red_code(texel.y) * level;
-    h.light.variance += past_variance(past) * weight;
-    h.frames += past_frames(past) * weight;
+    h.light.variance += past_variance(texel.z) * weight;
+    h.frames += past_frames(texel.z) * weight;
     h.weight += weight;
 }
 

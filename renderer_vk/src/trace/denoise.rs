@@ -42,7 +42,7 @@ enum Tier {
     Sparse,
 }
 
-/// Images for one size of view: 32 bytes a pixel for the adaptive filter, 8 for the sparse one. Light is stored with
+/// Images for one size of view: 25 bytes a pixel for the adaptive filter, 8 for the sparse one. Light is stored with
 /// its guide, for the adaptive filter also with its variance.
 struct Images {
     tier: Tier,
@@ -54,8 +54,8 @@ struct Images {
 
 /// Further images of the adaptive filter.
 struct AdaptiveImages {
-    /// Number of frames and variance, of this frame and the last. This frame's holds bounced light before.
-    past: [Image; 2],
+    /// Number of frames and variance; before, bounced light. The history has those of the last frame.
+    past: Image,
     /// For each stratum, light of one pixel of the last frame.
     samples: Image,
     sample_surfaces: Image,
@@ -97,10 +97,7 @@ impl AdaptiveImages {
         let strata = size.map(|s| s.div_ceil(STRATUM));
         let strata = |name, format| make(device, name, strata, format);
         Ok(Self {
-            past: [
-                make(device, "trace past", size, Format::R32Uint)?,
-                make(device, "trace last past", size, Format::R32Uint)?,
-            ],
+            past: make(device, "trace past", size, Format::R32Uint)?,
             samples: strata("trace samples", Format::Rgba32Uint)?,
             sample_surfaces: strata("trace sample surfaces", Format::Rgba32Uint)?,
             gradient_pixels: strata("trace gradient pixels", Format::R32Uint)?,
@@ -174,7 +171,7 @@ impl Denoiser {
     /// The image of this frame's bounced light with the adaptive filter: the filter overwrites it once it has read it.
     pub fn indirect(&self) -> Option<&Image> {
         let images = self.images.as_ref()?;
-        images.adaptive.as_ref().map(|adaptive| &adaptive.past[0])
+        images.adaptive.as_ref().map(|adaptive| &adaptive.past)
     }
 
     /// The images, if this frame has gradient samples.
@@ -198,7 +195,6 @@ impl Denoiser {
             stratum_guide: nothing,
             gradient: nothing,
             past: nothing,
-            last_past: nothing,
             depth_gradient: targets.depth_gradient[0].storage_index(),
             ..DenoiseView::default()
         };
@@ -227,8 +223,7 @@ impl Denoiser {
             gradient_samples: targets.scratch.address(),
             gradient_sums: targets.scratch.address() + 16 * strata,
             gradient: adaptive.gradient.storage_index(),
-            past: adaptive.past[0].storage_index(),
-            last_past: adaptive.past[1].storage_index(),
+            past: adaptive.past.storage_index(),
             ..view
         }
     }
@@ -275,9 +270,5 @@ impl Denoiser {
     /// Ends the frame: its images become those of the last frame.
     pub fn advance(&mut self) {
         self.history = self.images.is_some();
-        let images = self.images.as_mut();
-        if let Some(adaptive) = images.and_then(|i| i.adaptive.as_mut()) {
-            adaptive.past.swap(0, 1);
-        }
     }
 }

@@ -303,16 +303,6 @@ passes! {
         may_read: &[GradientPixels],
         writes: &[IndirectLight],
     }
-    /// Light at the points in fog.
-    FogLight = "trace_fog", Rays(&shaders::TRACE_FOG_LIGHT), FogCells {
-        reads: &[Scene, Lights, FogPoints],
-        writes: &[FogLight],
-    }
-    /// A step of the filter of that light.
-    FogFilter = "trace_fog_filter", Compute(&shaders::TRACE_FOG_FILTER_COMP), FogCells {
-        reads: &[FogWeights, FogLight],
-        writes: &[FilteredFogLight],
-    }
     /// Change of the light of each gradient pixel.
     GradientSample = "trace_gradient_sample", Compute(&shaders::TRACE_GRADIENT_SAMPLE_COMP), Strata {
         reads: &[GradientPixels, DirectLight, IndirectLight],
@@ -353,8 +343,8 @@ passes! {
     WaveletLast = "trace_wavelet", Compute(&shaders::TRACE_ATROUS_COMP), Traced {
         constants: &[(ids::atrous::NOISY_VARIANCE, 0), (ids::atrous::LAST, 1)],
         switch: Some((ids::atrous::BOUNCES, Bounces)),
-        reads: &[FreshLight, DepthGradient],
-        writes: &[DirectLight],
+        reads: &[FreshLight, DepthGradient, Past],
+        writes: &[LightHistory, DirectLight],
     }
     /// Sparse filter: running mean over frames, shortened where the light changes.
     SparseTemporal = "trace_sparse_temporal", Compute(&shaders::TRACE_SPARSE_TEMPORAL_COMP), Traced {
@@ -365,6 +355,16 @@ passes! {
     SparseFilter = "trace_sparse_filter", Compute(&shaders::TRACE_SPARSE_FILTER_COMP), Traced {
         reads: &[FreshLight, DepthGradient],
         writes: &[LightHistory, DirectLight],
+    }
+    /// Light at the points in fog.
+    FogLight = "trace_fog", Rays(&shaders::TRACE_FOG_LIGHT), FogCells {
+        reads: &[Scene, Lights, FogPoints],
+        writes: &[FogLight],
+    }
+    /// A step of the filter of that light.
+    FogFilter = "trace_fog_filter", Compute(&shaders::TRACE_FOG_FILTER_COMP), FogCells {
+        reads: &[FogWeights, FogLight],
+        writes: &[FilteredFogLight],
     }
     /// The linear picture; in reference mode the mean over frames.
     Composite = "trace_composite", Compute(&shaders::TRACE_COMPOSITE_COMP), Traced {

@@ -43,7 +43,8 @@ pub struct MotionView {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct DenoiseView {
-    /// Light history: after the first filter step of the last frame.
+    /// Light history: after the first filter step of the last frame, with number of frames and variance of the fresh
+    /// light in place of its own variance.
     pub history: u64,
     /// Light of this frame, joined with the history.
     pub fresh: u64,
@@ -67,10 +68,11 @@ pub struct DenoiseView {
     pub gradient: u32,
     /// Relative change of the inverse depth from pixel to pixel.
     pub depth_gradient: u32,
-    /// R32UI: number of frames and variance of each pixel. Until the temporal pass writes them it holds bounced light.
+    /// R32UI: number of frames and variance of each pixel, which the last filter step puts into the history. Until the
+    /// temporal pass writes them it holds bounced light.
     pub past: u32,
-    /// R32UI: `past` of the last frame.
-    pub last_past: u32,
+    /// Not used.
+    pub padding: u32,
 }
 
 /// Camera samples, and parameters of antialiasing.
