@@ -30,7 +30,7 @@ pub struct DenoiseArgs {
     oidn: Option<PathBuf>,
 }
 
-/// Frames that a guide is the mean of. Their cameras differ within a pixel, as those of the picture do.
+/// Frames that the guides are means of. Their cameras differ within a pixel, as those of the picture do.
 const GUIDE_FRAMES: u16 = 16;
 
 impl DenoiseArgs {
@@ -78,23 +78,35 @@ impl Denoiser {
     ) -> Result<()> {
         let color = renderer.read_radiance()?;
         let (width, height) = renderer.size();
-        let mut guide = |output, texel: &dyn Fn(&[u8]) -> Texel| {
-            renderer.set_settings(&Settings {
-                rt_debug: output,
-                // light is not shown
-                rt_bounces: 0,
-                ..settings.clone()
-            });
-            let mut mean = Mean::new(color.len());
-            for _ in 0..GUIDE_FRAMES {
-                draw(renderer)?;
-                let shown = renderer.read_pixels()?;
-                mean.add(shown.rgb.chunks_exact(3).map(texel));
-            }
-            anyhow::Ok(mean.texels())
+        // Without light, the picture is the albedo of what is lit, and the colour of sky, flames and other things that
+        // are not: it has the patterns of both, and no noise.
+        let unlit = Settings {
+            rt_illumination: false,
+            rt_bounces: 0,
+            rt_bloom: 0.0,
+            ..settings.clone()
         };
-        let albedo = guide(DebugOutput::Albedo, &albedo())?;
-        let normal = guide(DebugOutput::Normals, &normal)?;
+        renderer.set_settings(&Settings {
+            rt_debug: DebugOutput::Normals,
+            ..unlit.clone()
+        });
+        let mut normals = Mean::new(color.len());
+        let mut lit = vec![0.0; color.len()];
+        for _ in 0..GUIDE_FRAMES {
+            draw(renderer)?;
+            let shown = renderer.read_pixels()?;
+            let shown: Vec<Texel> = shown.rgb.chunks_exact(3).map(normal).collect();
+            for (lit, normal) in lit.iter_mut().zip(&shown) {
+                *lit += f32::from(u8::from(*normal != [0.0; 3])) / f32::from(GUIDE_FRAMES);
+            }
+            normals.add(shown.into_iter());
+        }
+        // the frames that showed normals are in its mean
+        renderer.set_settings(&unlit);
+        draw(renderer)?;
+        let shown = renderer.read_pixels()?;
+        let albedo: Vec<Texel> = shown.rgb.chunks_exact(3).map(albedo()).collect();
+        let normal = normals.texels();
         let guides = Guides {
             albedo: &albedo,
             normal: &normal,
@@ -102,13 +114,37 @@ impl Denoiser {
         };
         let size = (width as usize, height as usize);
         let filtered = self.oidn.denoise(size, &color, Some(guides))?;
+        let mixed = mixed(&color, &filtered, &lit);
         renderer.set_settings(settings);
         // the guides' frames have ended the mean; a new one begins, which the filtered picture replaces
         draw(renderer)?;
         ensure!(
-            renderer.replace_radiance(&filtered)?,
+            renderer.replace_radiance(&mixed)?,
             "there is no mean picture to filter"
         );
         draw(renderer)
+    }
+}
+
+/// The filtered colour by the share of a pixel that is lit. The rest has no noise of light, and a filter could only blur
+/// it: sky, flames, screens.
+fn mixed(color: &[Texel], filtered: &[Texel], lit: &[f32]) -> Vec<Texel> {
+    let pixels = color.iter().zip(filtered).zip(lit);
+    pixels
+        .map(|((color, filtered), lit)| {
+            std::array::from_fn(|k| color[k] + (filtered[k] - color[k]) * lit)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_lit_keeps_its_colour() {
+        let (color, filtered) = ([[1.0, 2.0, 3.0]; 3], [[2.0, 2.0, 1.0]; 3]);
+        let found = mixed(&color, &filtered, &[0.0, 0.5, 1.0]);
+        assert_eq!(found, [color[0], [1.5, 2.0, 2.0], filtered[0]]);
     }
 }

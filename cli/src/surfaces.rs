@@ -5,7 +5,8 @@ use relight::overbright;
 /// Colour or direction of a pixel.
 pub type Texel = [f32; 3];
 
-/// Decodes the albedo that `rt_debug 1` shows, linear; black where no surface is lit.
+/// Decodes the albedo that `rt_debug 1` shows, linear; black where no surface is lit. Also the picture of
+/// `rt_illumination 0`, which has the colour of what is not lit as well.
 pub fn albedo() -> impl Fn(&[u8]) -> Texel {
     let linear = overbright::byte_table();
     move |rgb| std::array::from_fn(|k| linear[usize::from(rgb[k])])
