@@ -5,7 +5,7 @@ use glam::{Mat4, Vec3, Vec4};
 use shaders::types::Instance;
 
 use crate::assets::Assets;
-use crate::gpu::{self, Access, ColorMask, Image, Recorder};
+use crate::gpu::{self, ColorMask, Image, Recorder};
 use crate::raster::{
     Aids, DrawList, FlareTest, Flares, Overlay, PixelLights, Raster, StageContext, Statics, Target,
     UiMeshes, ViewParameters, overlay_instance, window_to_clip,
@@ -98,10 +98,6 @@ impl<'a> FrameContext<'a> {
             mask: self.mask,
         };
         trace.record(recorder, view)?;
-        if self.depth.shares_memory() {
-            let mut pass = recorder.pass("clear depth", Access::TRANSFER, Access::TRANSFER)?;
-            pass.renew_depth(self.depth, 1.0);
-        }
         if test.count == 0 {
             return Ok(());
         }

@@ -32,8 +32,7 @@ impl FrameTargets {
 
     /// Makes images anew whose settings have changed: multisampled with `r_ext_multisample` if nothing is traced, with
     /// a stencil while shadow volumes are drawn. `format` is the colour format; only [`raster::COLOR_FORMAT`] and
-    /// [`raster::WIDE_FORMAT`] support writes of compute and ray tracing shaders. `shared`: a depth image in memory of the
-    /// traced look, which is taken if it fits.
+    /// [`raster::WIDE_FORMAT`] support writes of compute and ray tracing shaders.
     ///
     /// # Errors
     /// The device is out of memory.
@@ -42,7 +41,6 @@ impl FrameTargets {
         device: &Device,
         settings: &Settings,
         format: Format,
-        shared: Option<&Image>,
     ) -> Result<(), Error> {
         if self.color.format() != format {
             self.color = color_image(device, self.color.width(), self.color.height(), format)?;
@@ -66,28 +64,8 @@ impl FrameTargets {
                 self.several = Some(several);
             }
         }
-        let size = [self.color.width(), self.color.height()];
-        let fits = |depth: &&Image| {
-            samples == depth.samples()
-                && stencil == depth.format().has_stencil()
-                && size == [depth.width(), depth.height()]
-        };
-        let depth = &self.depth;
-        match shared.filter(fits) {
-            Some(shared) if !shared.is(depth) => {
-                device.immediate(|recorder| {
-                    let access = Access::TRANSFER;
-                    let mut pass = recorder.pass("clear depth", access, access)?;
-                    pass.renew_depth(shared, 1.0);
-                    Ok(())
-                })?;
-                self.depth = shared.clone();
-            }
-            Some(_) => {}
-            None if !fits(&depth) || depth.shares_memory() => {
-                self.depth = depth_image(device, &self.color, samples, stencil)?;
-            }
-            None => {}
+        if samples != self.depth.samples() || stencil != self.depth.format().has_stencil() {
+            self.depth = depth_image(device, &self.color, samples, stencil)?;
         }
         Ok(())
     }

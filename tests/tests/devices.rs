@@ -361,9 +361,10 @@ fn a_wait_for_the_display_may_fail() {
     }
     let whole = play(&on_display("5", "1", "6"));
     assert_eq!(whole.failure, None, "{}", whole.text);
-    let (last, results) = &whole.calls["vkWaitForPresentKHR"];
+    let (_, results) = &whole.calls["vkWaitForPresentKHR"];
     let mut sessions = Vec::new();
-    for number in spread(*last, 3) {
+    // how often a display is asked depends on the time that it takes; each frame but the first waits at least once
+    for number in [1, 2, 4] {
         sessions.extend(results.iter().map(|result| Session {
             fault: Some(format!("vkWaitForPresentKHR {number} {result}")),
             ..on_display("5", "1", "6")

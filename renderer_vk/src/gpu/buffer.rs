@@ -101,16 +101,6 @@ impl Buffer {
     /// # Errors
     /// Out of memory.
     pub fn new(device: &Device, desc: &BufferDesc<'_>) -> Result<Self, Error> {
-        Ok(Self::with_room(device, desc, None)?.0)
-    }
-
-    /// Makes a buffer whose memory may also be bound to an image with the requirements `image`; `false`: the device has
-    /// no memory for both.
-    pub(crate) fn with_room(
-        device: &Device,
-        desc: &BufferDesc<'_>,
-        image: Option<vk::MemoryRequirements>,
-    ) -> Result<(Self, bool), Error> {
         use vk::BufferUsageFlags as F;
         let size = desc.size.max(16).next_multiple_of(4);
         let mut usage =
@@ -136,17 +126,7 @@ impl Buffer {
         // SAFETY: the usage flags belong to features that are on.
         let raw = unsafe { vk.create_buffer(&info, None) }.context("vkCreateBuffer")?;
         // SAFETY: `raw` was just made.
-        let own = unsafe { vk.get_buffer_memory_requirements(raw) };
-        let both = image.map(|image| {
-            let granularity = device.image_granularity();
-            vk::MemoryRequirements {
-                size: own.size.max(image.size).next_multiple_of(granularity),
-                alignment: own.alignment.max(image.alignment).max(granularity),
-                memory_type_bits: own.memory_type_bits & image.memory_type_bits,
-            }
-        });
-        let both = both.filter(|both| both.memory_type_bits != 0);
-        let requirements = both.unwrap_or(own);
+        let requirements = unsafe { vk.get_buffer_memory_requirements(raw) };
         let location = match desc.memory {
             Memory::Device => MemoryLocation::GpuOnly,
             Memory::Upload => MemoryLocation::CpuToGpu,
@@ -196,7 +176,7 @@ impl Buffer {
         // SAFETY: the buffer is bound and was made with the address usage.
         inner.address = unsafe { vk.get_buffer_device_address(&info) };
         device.0.name(raw, desc.name);
-        Ok((Self(Arc::new(inner)), both.is_some()))
+        Ok(Self(Arc::new(inner)))
     }
 
     /// A device buffer with the content `data`, which later submissions read.
@@ -261,20 +241,6 @@ impl Buffer {
     /// The label.
     pub fn name(&self) -> &str {
         &self.0.name
-    }
-
-    /// Binds an image to the buffer's memory, which was made [with room](Self::with_room) for it.
-    pub(crate) fn bind(&self, image: vk::Image) -> Result<(), Error> {
-        let memory = lock(&self.0.memory);
-        let Some(memory) = memory.as_ref() else {
-            return Ok(());
-        };
-        // SAFETY: the memory fits the image, and lives as long as the buffer, which the image holds.
-        let bound = unsafe {
-            let vk = self.0.device.vk();
-            vk.bind_image_memory(image, memory.memory(), memory.offset())
-        };
-        bound.context("vkBindImageMemory")
     }
 
     /// Takes the raw buffer and its memory from a buffer with a single owner; the caller buries them.

@@ -316,25 +316,6 @@ impl Pass<'_> {
         );
     }
 
-    /// Clears a depth image that [shares memory](Image::shares_memory), and its stencil; what it held before is lost.
-    pub fn renew_depth(&mut self, image: &Image, depth: f32) {
-        self.end_rendering();
-        if !image.0.aspect.contains(vk::ImageAspectFlags::DEPTH) {
-            self.refuse("a depth clear of a colour image");
-            return;
-        }
-        let cleared = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
-        self.change_layout(image, vk::ImageLayout::UNDEFINED, cleared);
-        let value = vk::ClearDepthStencilValue { depth, stencil: 0 };
-        let parts = [whole(image.0.aspect)];
-        // SAFETY: the image is in this layout; outside of a render pass.
-        unsafe {
-            let (cmd, raw) = (self.cmd(), image.0.raw);
-            (self.vk()).cmd_clear_depth_stencil_image(cmd, raw, cleared, &value, &parts);
-        }
-        self.change_layout(image, cleared, image.0.layout);
-    }
-
     /// Generates levels 1 and up, each from the previous one with a linear filter.
     pub fn generate_mips(&mut self, image: &Image) {
         self.end_rendering();

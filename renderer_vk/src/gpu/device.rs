@@ -307,16 +307,6 @@ impl Device {
         }
     }
 
-    /// Distance, bytes, of a buffer and an image that share memory without overlapping.
-    pub(crate) fn image_granularity(&self) -> u64 {
-        // SAFETY: the physical device belongs to the live instance.
-        let properties = unsafe {
-            let instance = &self.0.core.instance.raw;
-            instance.get_physical_device_properties(self.0.physical)
-        };
-        properties.limits.buffer_image_granularity.max(1)
-    }
-
     /// Whether the device can render to images of a colour or depth format with this number of samples.
     pub fn supports_samples(&self, format: Format, samples: u32) -> bool {
         let usage = if format.aspect() == vk::ImageAspectFlags::COLOR {
@@ -485,8 +475,6 @@ impl DeviceInner {
                 unsafe { raw.destroy_image(image, None) };
                 self.free(memory);
             }
-            // SAFETY: see above.
-            Garbage::PlacedImage(image) => unsafe { raw.destroy_image(image, None) },
             Garbage::View(view) => {
                 // frames that could use the framebuffer could also use the view
                 let mut framebuffers = lock(&self.framebuffers);

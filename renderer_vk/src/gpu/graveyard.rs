@@ -13,8 +13,6 @@ pub(crate) enum Garbage {
     /// A staging buffer, which uploads may reuse.
     Staging(vk::Buffer, Allocation),
     Image(vk::Image, Allocation),
-    /// An image in memory of something else.
-    PlacedImage(vk::Image),
     View(vk::ImageView),
     Pipeline(vk::Pipeline),
     CommandPool(vk::CommandPool),

@@ -11,7 +11,6 @@ use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::Allocation;
 
-use super::buffer::{Buffer, BufferDesc};
 use super::device::{Device, lock};
 use super::error::{Context, Error};
 use super::graveyard::Garbage;
@@ -217,12 +216,6 @@ impl<'a> ImageDesc<'a> {
         }
     }
 
-    /// Number of levels and layers.
-    fn levels(&self) -> (u32, u32) {
-        let most = 32 - self.width.max(self.height).leading_zeros();
-        (self.mips.clamp(1, most), self.layers.max(1))
-    }
-
     /// Checks that the device supports the image.
     fn check(&self, device: &Device) -> Result<(), Error> {
         let limit = device.0.info.max_image_size;
@@ -265,12 +258,10 @@ impl<'a> ImageDesc<'a> {
 pub(crate) struct ImageInner {
     device: Device,
     pub raw: vk::Image,
-    /// `None`: the image belongs to a swapchain, to `owner`, or is in the memory of `room`.
+    /// `None`: the image belongs to a swapchain, or to `owner`.
     memory: Mutex<Option<Allocation>>,
     /// The image whose texels this one reads and writes in another format.
     owner: Option<Image>,
-    /// The buffer whose memory this one uses.
-    room: Option<Buffer>,
     other_format: Option<Format>,
     /// All levels and layers.
     view: vk::ImageView,
@@ -334,41 +325,6 @@ pub(crate) fn layout_change(
         .subresource_range(whole(aspect))
 }
 
-/// Makes an image without memory.
-fn make_raw(
-    device: &Device,
-    desc: &ImageDesc<'_>,
-) -> Result<(vk::Image, vk::MemoryRequirements), Error> {
-    desc.check(device)?;
-    let (mips, layers) = desc.levels();
-    let formats = [desc.format, desc.other_format.unwrap_or(desc.format)].map(Format::vk);
-    let mut formats = vk::ImageFormatListCreateInfo::default().view_formats(&formats);
-    let mut info = vk::ImageCreateInfo::default()
-        .image_type(vk::ImageType::TYPE_2D)
-        .format(desc.format.vk())
-        .extent(vk::Extent3D {
-            width: desc.width,
-            height: desc.height,
-            depth: 1,
-        })
-        .mip_levels(mips)
-        .array_layers(layers)
-        .samples(vk::SampleCountFlags::from_raw(desc.samples.max(1)))
-        .tiling(vk::ImageTiling::OPTIMAL)
-        .usage(desc.usage.vk().0)
-        .initial_layout(vk::ImageLayout::UNDEFINED);
-    if desc.other_format.is_some() {
-        info = info
-            .flags(vk::ImageCreateFlags::MUTABLE_FORMAT)
-            .push_next(&mut formats);
-    }
-    let vk = device.vk();
-    // SAFETY: size and format were checked against the device.
-    let raw = unsafe { vk.create_image(&info, None) }.context("vkCreateImage")?;
-    // SAFETY: `raw` was just made.
-    Ok((raw, unsafe { vk.get_image_memory_requirements(raw) }))
-}
-
 impl Image {
     /// Makes an image; its contents are undefined until written.
     ///
@@ -376,56 +332,81 @@ impl Image {
     /// Out of memory, a full descriptor table, a size of zero or beyond the device's limit, a format that does not
     /// support the usage.
     pub fn new(device: &Device, desc: &ImageDesc<'_>) -> Result<Self, Error> {
-        let (raw, requirements) = make_raw(device, desc)?;
+        desc.check(device)?;
+        let most_mips = 32 - desc.width.max(desc.height).leading_zeros();
+        let (mips, layers) = (desc.mips.clamp(1, most_mips), desc.layers.max(1));
+        let formats = [desc.format, desc.other_format.unwrap_or(desc.format)].map(Format::vk);
+        let mut formats = vk::ImageFormatListCreateInfo::default().view_formats(&formats);
+        let mut info = vk::ImageCreateInfo::default()
+            .image_type(vk::ImageType::TYPE_2D)
+            .format(desc.format.vk())
+            .extent(vk::Extent3D {
+                width: desc.width,
+                height: desc.height,
+                depth: 1,
+            })
+            .mip_levels(mips)
+            .array_layers(layers)
+            .samples(vk::SampleCountFlags::from_raw(desc.samples.max(1)))
+            .tiling(vk::ImageTiling::OPTIMAL)
+            .usage(desc.usage.vk().0)
+            .initial_layout(vk::ImageLayout::UNDEFINED);
+        if desc.other_format.is_some() {
+            info = info
+                .flags(vk::ImageCreateFlags::MUTABLE_FORMAT)
+                .push_next(&mut formats);
+        }
+        let vk = device.vk();
+        // SAFETY: size and format were checked against the device.
+        let raw = unsafe { vk.create_image(&info, None) }.context("vkCreateImage")?;
+        // SAFETY: `raw` was just made.
+        let requirements = unsafe { vk.get_image_memory_requirements(raw) };
         let kind = desc.usage.memory();
         let gpu_only = MemoryLocation::GpuOnly;
         let memory = match (device.0).allocate(desc.name, kind, requirements, gpu_only, false) {
             Ok(memory) => memory,
             Err(e) => {
                 // SAFETY: nothing uses the new image.
-                unsafe { device.vk().destroy_image(raw, None) };
+                unsafe { vk.destroy_image(raw, None) };
                 return Err(e);
             }
         };
         // SAFETY: the memory object is only used for the binding below.
         let (object, offset) = (unsafe { memory.memory() }, memory.offset());
         // SAFETY: the memory was allocated for these requirements and is bound once.
-        let bound = unsafe { device.vk().bind_image_memory(raw, object, offset) };
-        let inner = ImageInner::of(device, desc, raw, Some(memory), None);
-        bound.context("vkBindImageMemory")?;
-        inner.finish(desc)
-    }
-
-    /// Makes a buffer, and an image in its memory: what is written to one of them destroys the other. Each use of the
-    /// image begins with [`Pass::renew_depth`](super::Pass::renew_depth). No image if the device has no memory for both.
-    ///
-    /// # Errors
-    /// Those of [`Image::new`] and [`Buffer::new`].
-    pub fn in_memory_of(
-        device: &Device,
-        buffer: &BufferDesc<'_>,
-        desc: &ImageDesc<'_>,
-    ) -> Result<(Buffer, Option<Self>), Error> {
-        let (raw, requirements) = make_raw(device, desc)?;
-        let made = Buffer::with_room(device, buffer, Some(requirements));
-        let Ok((buffer, true)) = made else {
-            // SAFETY: nothing uses the new image.
-            unsafe { device.vk().destroy_image(raw, None) };
-            return made.map(|(buffer, _)| (buffer, None));
+        let bound = unsafe { vk.bind_image_memory(raw, object, offset) };
+        let only_sampled = desc.usage == ImageUsage::SAMPLED;
+        let mut inner = ImageInner {
+            device: device.clone(),
+            raw,
+            memory: Mutex::new(Some(memory)),
+            owner: None,
+            other_format: desc.other_format,
+            view: vk::ImageView::null(),
+            target: vk::ImageView::null(),
+            layout: if only_sampled {
+                vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL
+            } else {
+                vk::ImageLayout::GENERAL
+            },
+            aspect: desc.format.aspect(),
+            width: desc.width,
+            height: desc.height,
+            mips,
+            layers,
+            format: desc.format,
+            usage: desc.usage,
+            samples: desc.samples.max(1),
+            texture: NO_INDEX,
+            storage: NO_INDEX,
+            name: desc.name.to_owned(),
         };
-        let inner = ImageInner::of(device, desc, raw, None, Some(buffer.clone()));
-        buffer.bind(raw)?;
-        Ok((buffer, Some(inner.finish(desc)?)))
-    }
-
-    /// Whether its texels share memory with a buffer.
-    pub fn shares_memory(&self) -> bool {
-        self.0.room.is_some()
-    }
-
-    /// Whether both are the same image.
-    pub fn is(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.0, &other.0)
+        bound.context("vkBindImageMemory")?;
+        device.0.name(raw, desc.name);
+        inner.make_views()?;
+        let image = Self(Arc::new(inner));
+        device.queue_init(&image);
+        Ok(image)
     }
 
     /// The same texels, read and written in the other format that the image was made for. Passes that use an image in
@@ -443,7 +424,6 @@ impl Image {
             raw: own.raw,
             memory: Mutex::new(None),
             owner: Some(self.clone()),
-            room: None,
             other_format: Some(own.format),
             view: vk::ImageView::null(),
             target: vk::ImageView::null(),
@@ -483,7 +463,6 @@ impl Image {
             raw,
             memory: Mutex::new(None),
             owner: None,
-            room: None,
             other_format: None,
             view: vk::ImageView::null(),
             target: vk::ImageView::null(),
@@ -583,52 +562,6 @@ impl std::fmt::Debug for Image {
 }
 
 impl ImageInner {
-    /// An image without views, in its own `memory` or in that of `room`.
-    fn of(
-        device: &Device,
-        desc: &ImageDesc<'_>,
-        raw: vk::Image,
-        memory: Option<Allocation>,
-        room: Option<Buffer>,
-    ) -> Self {
-        let (mips, layers) = desc.levels();
-        Self {
-            device: device.clone(),
-            raw,
-            memory: Mutex::new(memory),
-            owner: None,
-            room,
-            other_format: desc.other_format,
-            view: vk::ImageView::null(),
-            target: vk::ImageView::null(),
-            layout: if desc.usage == ImageUsage::SAMPLED {
-                vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL
-            } else {
-                vk::ImageLayout::GENERAL
-            },
-            aspect: desc.format.aspect(),
-            width: desc.width,
-            height: desc.height,
-            mips,
-            layers,
-            format: desc.format,
-            usage: desc.usage,
-            samples: desc.samples.max(1),
-            texture: NO_INDEX,
-            storage: NO_INDEX,
-            name: desc.name.to_owned(),
-        }
-    }
-
-    /// Names the image, makes its views, and queues its first layout.
-    fn finish(mut self, desc: &ImageDesc<'_>) -> Result<Image, Error> {
-        self.device.0.name(self.raw, desc.name);
-        self.make_views()?;
-        let image = Image(Arc::new(self));
-        image.0.device.queue_init(&image);
-        Ok(image)
-    }
-
     /// Aspects of copies: for depth and stencil, the depth.
     pub fn copied(&self) -> vk::ImageAspectFlags {
         if self.aspect.contains(vk::ImageAspectFlags::DEPTH) {
@@ -696,9 +629,6 @@ impl Drop for ImageInner {
         }
         if let Some(memory) = lock(&self.memory).take() {
             device.bury(Garbage::Image(self.raw, memory));
-        }
-        if self.room.is_some() {
-            device.bury(Garbage::PlacedImage(self.raw));
         }
     }
 }

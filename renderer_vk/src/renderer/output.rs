@@ -168,9 +168,7 @@ impl Renderer {
         let show = end && !self.hidden && self.swapchain.is_some();
         if !self.queue.is_empty() {
             let format = self.picture_format();
-            let shared = self.trace.as_ref().and_then(|trace| trace.depth());
-            self.targets
-                .fit(&self.device, &self.settings, format, shared)?;
+            self.targets.fit(&self.device, &self.settings, format)?;
         }
         let begin = Instant::now();
         let mut recorder = self.ring.begin()?;

@@ -58,9 +58,7 @@ impl Renderer {
     /// Draws all registered materials once, invisibly.
     fn warm_up(&mut self) -> Result<(), Error> {
         let format = self.picture_format();
-        let shared = self.trace.as_ref().and_then(|trace| trace.depth());
-        self.targets
-            .fit(&self.device, &self.settings, format, shared)?;
+        self.targets.fit(&self.device, &self.settings, format)?;
         let Some(assets) = &mut self.assets else {
             return Ok(());
         };

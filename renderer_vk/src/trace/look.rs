@@ -338,12 +338,6 @@ impl TraceLook {
         }
     }
 
-    /// A depth image for the classic look, of the size of the last view's target, in memory that only the passes of a
-    /// traced view use.
-    pub fn depth(&self) -> Option<&Image> {
-        self.tracer.targets.as_ref()?.depth.as_ref()
-    }
-
     /// The linear picture of the last view, before exposure: RGBA, 32-bit floats.
     pub fn hdr(&self) -> Option<&Image> {
         self.tracer.hdr()

@@ -13,17 +13,16 @@ pub(super) fn texels(
     size: [u32; 2],
     bytes: u64,
 ) -> Result<Buffer, Error> {
-    Buffer::new(device, &texels_desc(name, size, bytes))
-}
-
-fn texels_desc(name: &str, size: [u32; 2], bytes: u64) -> BufferDesc<'_> {
     let [width, height] = size.map(u64::from);
-    BufferDesc {
-        name,
-        size: width * height * bytes,
-        usage: BufferUsage::SCREEN,
-        memory: Memory::Device,
-    }
+    Buffer::new(
+        device,
+        &BufferDesc {
+            name,
+            size: width * height * bytes,
+            usage: BufferUsage::SCREEN,
+            memory: Memory::Device,
+        },
+    )
 }
 
 /// A storage image of a size in pixels.
@@ -58,8 +57,6 @@ pub struct Targets {
     /// 16 bytes a pixel that passes use in turns: primary hits, then sampled lights, then light that the denoiser
     /// filters.
     pub scratch: Buffer,
-    /// A depth image of the size of the view's target, in the memory of `scratch`; for the classic look.
-    pub depth: Option<Image>,
     /// `Rg32Uint`: world position of the shown surface, relative to the ray through the pixel (`gbuffer.glsl`). Written
     /// by `primary_simple` and `primary`, read by all passes that light, and last by the first pass of the denoiser.
     pub position: Image,
@@ -105,17 +102,11 @@ pub struct Targets {
 }
 
 impl Targets {
-    /// Makes the images; their contents are undefined. `target`: size of the image that the view is in; `stencil`: the
-    /// classic look's depth has one.
+    /// Makes the images; their contents are undefined.
     ///
     /// # Errors
     /// Out of memory.
-    pub fn new(
-        device: &Device,
-        [width, height]: [u32; 2],
-        target: [u32; 2],
-        stencil: bool,
-    ) -> Result<Self, Error> {
+    pub fn new(device: &Device, width: u32, height: u32) -> Result<Self, Error> {
         let size = [width, height];
         let make = |name, format| Image::new(device, &storage(name, size, format));
         let shared = |name, format, other_format| {
@@ -131,30 +122,15 @@ impl Targets {
         let (direct, depth_gradient) = shared("trace direct", Format::R32Uint, Format::Rg16F)?;
         let (last_direct, last_depth_gradient) =
             shared("trace last direct", Format::R32Uint, Format::Rg16F)?;
-        let scratch = texels_desc(
-            "trace scratch",
-            size.map(|n| n.next_multiple_of(RAY_TILE)),
-            16,
-        );
-        let depth_format = device.depth_format(stencil);
-        let depth = ImageDesc::new(
-            "frame depth",
-            target[0],
-            target[1],
-            depth_format,
-            ImageUsage::DEPTH,
-        );
-        // not if the buffer would grow by it
-        let (scratch, depth) = if depth_format.bytes(target[0], target[1]) < scratch.size {
-            Image::in_memory_of(device, &scratch, &depth)?
-        } else {
-            (Buffer::new(device, &scratch)?, None)
-        };
         Ok(Self {
             width,
             height,
-            scratch,
-            depth,
+            scratch: texels(
+                device,
+                "trace scratch",
+                size.map(|n| n.next_multiple_of(RAY_TILE)),
+                16,
+            )?,
             position,
             fog,
             surface,

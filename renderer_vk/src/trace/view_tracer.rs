@@ -26,7 +26,7 @@ use super::targets::{OwnImages, Targets};
 use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
 use crate::scene::TracedScene;
-use crate::settings::{DebugOutput, DenoiserChoice, LightSelection, ModelShadows, Settings};
+use crate::settings::{DebugOutput, DenoiserChoice, LightSelection, Settings};
 use crate::world::outside;
 use content::content_hash;
 use parameters::{Prepared, camera_frame, portal_record};
@@ -195,27 +195,19 @@ impl ViewTracer {
             map: view.map.filter(|_| view.scene.has_world),
             ..view
         };
-        let target = [view.target.width(), view.target.height()];
-        let mut targets =
-            self.take_targets(traced_size(view.settings, output), target, view.settings)?;
+        let mut targets = self.take_targets(traced_size(view.settings, output))?;
         let recorded = self.record_to(&mut targets, rec, &view, output);
         self.targets = Some(targets);
         recorded
     }
 
     /// Takes the images of a size in pixels; drops images of another size, with their history.
-    fn take_targets(
-        &mut self,
-        size: [u32; 2],
-        target: [u32; 2],
-        settings: &Settings,
-    ) -> Result<Targets, Error> {
+    fn take_targets(&mut self, size: [u32; 2]) -> Result<Targets, Error> {
         let fits = |t: &mut Targets| [t.width, t.height] == size;
         if let Some(targets) = self.targets.take_if(fits) {
             return Ok(targets);
         }
-        let stencil = settings.shadows == ModelShadows::Volumes;
-        let targets = Targets::new(&self.device, size, target, stencil)?;
+        let targets = Targets::new(&self.device, size[0], size[1])?;
         self.targets = None;
         self.history = None;
         self.accumulated = (0, 0);
