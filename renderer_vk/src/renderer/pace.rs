@@ -1,4 +1,4 @@
-//! `r_lowLatency`: at the end of a frame, waits for the frame before. [`Pacer`](crate::pacing::Pacer) measures and
+//! `r_lowLatency`: at the end of a frame, waits for the frame before. [`Pacer`] measures and
 //! decides.
 
 use std::time::{Duration, Instant};

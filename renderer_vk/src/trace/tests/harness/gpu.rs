@@ -354,7 +354,11 @@ fn place(
     let [x, y] = [0, 1].map(|i| (pixel[i] as f32 + 0.5) / size[i] as f32 * 2.0 - 1.0);
     let ray = (camera.forward - camera.left * x - camera.up * y).normalize();
     let [low, high] = away;
-    let steps = [low & 0xF_FFFF, low >> 20 | (high & 0xFF) << 12, high >> 8 & 0xF_FFFF];
+    let steps = [
+        low & 0xF_FFFF,
+        low >> 20 | (high & 0xFF) << 12,
+        high >> 8 & 0xF_FFFF,
+    ];
     let step = ((high >> 28) as f32 + 3.0 - 19.0).exp2();
     let away = Vec3::from(steps.map(|n| (n as f32 - (1 << 19) as f32) * step));
     let place = camera.origin + ray * distance + away;
