@@ -125,7 +125,7 @@ vec4 motion_of(CameraRay ray, LastPlace place) {
 
 // `motion`: result of `motion_of`.
 void motion_write(ivec2 pixel, vec4 motion, float mark) {
-    imageStore(images_rgba16f[VIEW.images.motion], pixel, vec4(motion.xyz, mark));
+    imageStore(images_rgba16f[VIEW.images.motion], pixel, vec4(motion.xy, as_half(motion.z), mark));
 }
 
 // Whether a surface of this motion rests in the picture.

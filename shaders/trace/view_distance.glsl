@@ -1,5 +1,5 @@
 // View distance: length of the path from the camera to the surface that a pixel shows. Two images hold it, exactly: a
-// half float without the lower bits of the mantissa, which the next frame reads too, and those bits with flags.
+// half float, which the next frame reads too, and the bits of the mantissa that it lacks, with flags.
 #ifndef RELIGHT_TRACE_VIEW_DISTANCE_GLSL
 #define RELIGHT_TRACE_VIEW_DISTANCE_GLSL
 
@@ -10,17 +10,25 @@ const float SKY_DISTANCE = 60000.0;
 // Least view distance that is stored: the least half float with a full mantissa.
 const float LEAST_DISTANCE = 1.0 / 16384.0;
 
-// Bits of a float's mantissa that a half float lacks; the pixel shows a lit surface; it belongs to the first-person view.
-const uint TAIL_BITS = 0x1FFFu, TAIL_LIT = 1u << 13, TAIL_FIRST_PERSON = 1u << 14;
+// Bits of a float's mantissa that a half float lacks; the pixel shows a lit surface; it belongs to the first-person view;
+// the half float is the next above the distance.
+const uint TAIL_BITS = 0x1FFFu, TAIL_LIT = 1u << 13, TAIL_FIRST_PERSON = 1u << 14, TAIL_ABOVE = 1u << 15;
 
 float stored_distance(float view_distance) { return clamp(view_distance, LEAST_DISTANCE, SKY_DISTANCE); }
+
+// The nearest half float, halves to even: images of half floats store it exactly, and equal distances as equal numbers;
+// left to themselves, drivers round in either direction.
+uint half_bits(uint bits) { return bits + 0xFFFu + (bits >> 13 & 1u) & ~TAIL_BITS; }
+float as_half(float v) { return uintBitsToFloat(half_bits(floatBitsToUint(v))); }
 
 // `rests`: the surface does not move in the picture.
 void view_distance_write(ivec2 pixel, float view_distance, bool rests, bool is_lit, bool first_person) {
     uint bits = floatBitsToUint(stored_distance(view_distance));
-    float head = uintBitsToFloat(bits & ~TAIL_BITS);
+    uint rounded = half_bits(bits);
+    float head = uintBitsToFloat(rounded);
     imageStore(images_r16f[VIEW.motion.view_distance], pixel, vec4(rests ? head : -head));
-    imageStore(uimages_r16ui[VIEW.images.distance_tail], pixel, uvec4(bits & TAIL_BITS | (is_lit ? TAIL_LIT : 0u) | (first_person ? TAIL_FIRST_PERSON : 0u)));
+    uint tail = bits & TAIL_BITS | (rounded > bits ? TAIL_ABOVE : 0u) | (is_lit ? TAIL_LIT : 0u) | (first_person ? TAIL_FIRST_PERSON : 0u);
+    imageStore(uimages_r16ui[VIEW.images.distance_tail], pixel, uvec4(tail));
 }
 
 uint distance_tail_read(ivec2 pixel) { return imageLoad(uimages_r16ui[VIEW.images.distance_tail], pixel).x; }
@@ -31,6 +39,7 @@ bool is_lit_read(ivec2 pixel) { return (distance_tail_read(pixel) & TAIL_LIT) !=
 // View distance of the lit surface; -1: none. `tail`: that of the pixel.
 float lit_distance_read(ivec2 pixel, uint tail) {
     uint head = floatBitsToUint(abs(imageLoad(images_r16f[VIEW.motion.view_distance], pixel).x));
+    if ((tail & TAIL_ABOVE) != 0) head -= TAIL_BITS + 1u;
     return (tail & TAIL_LIT) != 0 ? uintBitsToFloat(head | tail & TAIL_BITS) : -1.0;
 }
 

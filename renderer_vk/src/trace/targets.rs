@@ -77,11 +77,10 @@ pub struct Targets {
     /// frame (negative: unknown), and the pixel's mark (`motion.glsl`). Read by the denoiser and by temporal
     /// antialiasing.
     pub motion: Image,
-    /// `R16F`: view distance in this frame and in the last, without the lower bits; negative where the surface moves in
-    /// the picture.
+    /// `R16F`: view distance in this frame and in the last; negative where the surface moves in the picture.
     pub view_distance: [Image; 2],
-    /// `R16Uint`: the lower bits of this frame's view distance; whether the pixel shows a surface to light, and one that
-    /// only camera rays see (`view_distance.glsl`).
+    /// `R16Uint`: what half floats lack of this frame's view distance; whether the pixel shows a surface to light, and
+    /// one that only camera rays see (`view_distance.glsl`).
     pub distance_tail: Image,
     /// `R32Uint`, light: direct light of lamps and suns, without albedo; of this frame and the last. Written by
     /// `direct` and `suns`; the denoiser replaces it with the filtered light for `composite`.

@@ -216,7 +216,13 @@ mod tests {
         let other: Vec<f32> = (0..truth.len())
             .map(|at| {
                 let (albedo, _) = surfaces[at].expect("lit");
-                faded[at] + albedo * if (at / WIDTH).is_multiple_of(2) { 0.3 } else { -0.3 }
+                faded[at]
+                    + albedo
+                        * if (at / WIDTH).is_multiple_of(2) {
+                            0.3
+                        } else {
+                            -0.3
+                        }
             })
             .collect();
         close(
@@ -243,8 +249,9 @@ mod tests {
         };
         let dark: Vec<f32> = (0..truth.len()).map(dark).collect();
         assert!(Shadows::new(WIDTH, &dark, &surfaces, &all).tiles.is_empty());
-        let step =
-            |at: usize| surfaces[at].map(|(a, d)| (a, if at.is_multiple_of(8) { d * 2.0 } else { d }));
+        let step = |at: usize| {
+            surfaces[at].map(|(a, d)| (a, if at.is_multiple_of(8) { d * 2.0 } else { d }))
+        };
         let steps: Vec<Surface> = (0..truth.len()).map(step).collect();
         none(&truth, &steps, &all);
         let sky = |at: usize| surfaces[at].filter(|_| at % 8 != 3);

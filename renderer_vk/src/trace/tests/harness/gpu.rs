@@ -59,6 +59,8 @@ pub struct Gpu {
     pub device: Device,
     pub tracer: Tracer,
     pub look: ViewTracer,
+    /// Camera of the last frame, unless that was of a reference picture.
+    camera: CameraView,
     pub ring: FrameRing,
     pub passes: Arc<PassSet>,
     /// Dropped last, when nothing of this test is left on the device.
@@ -131,6 +133,7 @@ impl Gpu {
         let device = passes.device().clone();
         Ok(Self {
             look: ViewTracer::new(&passes).expect("a device"),
+            camera: CameraView::default(),
             tracer,
             ring: FrameRing::new(&device, 2).expect("frames"),
             device,
@@ -269,6 +272,7 @@ impl Gpu {
         let picture: Vec<[u8; 4]> =
             bytemuck::pod_collect_to_vec(&self.device.read_image(&target).expect("read"));
         self.check_messages();
+        self.camera = self.look.history.unwrap_or_default();
         self.look.reset();
         (linear, picture)
     }
@@ -303,7 +307,6 @@ impl Gpu {
         let read = |image| self.device.read_image(image).expect("read");
         let away: Vec<[u32; 2]> = bytemuck::pod_collect_to_vec(&read(&targets.position));
         let tails: Vec<u16> = bytemuck::pod_collect_to_vec(&read(&targets.distance_tail));
-        let camera = self.look.history.expect("not a reference picture");
         let halves: Vec<[u16; 4]> = bytemuck::pod_collect_to_vec(&read(&targets.motion));
         let paths: Vec<u16> = bytemuck::pod_collect_to_vec(&read(&targets.view_distance[1]));
         let motions = halves.iter().zip(&paths).map(|(motion, path)| {
@@ -315,7 +318,7 @@ impl Gpu {
         let places = places.map(|(i, (away, (tail, path)))| {
             let (x, y) = (i as u32 % targets.width, i as u32 / targets.width);
             let size = [targets.width, targets.height];
-            place(&camera, [x, y], size, away, half(*path), *tail)
+            place(&self.camera, [x, y], size, away, half(*path), *tail)
         });
         places.zip(motions).collect()
     }
@@ -350,7 +353,8 @@ fn place(
     if !lit {
         return [0.0, 0.0, 0.0, -1.0];
     }
-    let distance = f32::from_bits(distance.abs().to_bits() | u32::from(tail) & 0x1FFF);
+    let above = u32::from(tail >> 15) << 13;
+    let distance = f32::from_bits(distance.abs().to_bits() - above | u32::from(tail) & 0x1FFF);
     let [x, y] = [0, 1].map(|i| (pixel[i] as f32 + 0.5) / size[i] as f32 * 2.0 - 1.0);
     let ray = (camera.forward - camera.left * x - camera.up * y).normalize();
     let [low, high] = away;
