@@ -354,7 +354,7 @@ fn place(
         return [0.0, 0.0, 0.0, -1.0];
     }
     let above = u32::from(tail >> 15) << 13;
-    let distance = f32::from_bits(distance.abs().to_bits() - above | u32::from(tail) & 0x1FFF);
+    let distance = f32::from_bits((distance.abs().to_bits() - above) | (u32::from(tail) & 0x1FFF));
     let [x, y] = [0, 1].map(|i| (pixel[i] as f32 + 0.5) / size[i] as f32 * 2.0 - 1.0);
     let ray = (camera.forward - camera.left * x - camera.up * y).normalize();
     let [low, high] = away;
