@@ -1,8 +1,8 @@
-//! Pace of the frames of a window: how many wait for the GPU and the display, and the time from input to picture.
+//! Frame pacing: how long to delay the engine at the end of a frame, and the latency from input to picture.
 //!
-//! The engine reads input after a frame's end and before the next frame's calls. Whatever is waited for later than a
-//! frame's end is time by which the picture is older than it need be. This module decides by times alone;
-//! `renderer/pace.rs` waits.
+//! The engine reads input after a frame's end and before the next frame's calls. Every wait between that input and the
+//! picture adds to the latency, so the waits are moved to the frame's end. This module only computes, from timestamps
+//! that it is given; `renderer/pace.rs` takes the timestamps and waits.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -14,9 +14,9 @@ use crate::statistics::{Latency, Spread};
 const REMEMBERED: usize = 64;
 /// Number of frames whose latency is reported.
 const REPORTED: usize = 512;
-/// By how much earlier than it need be a frame is begun: what a sleep of the system may last too long.
+/// Safety margin of the delay: a sleep of the system may last this much longer than asked.
 const MARGIN: Duration = Duration::from_micros(500);
-/// Frames of which it is not known whether they are shown. More than can wait for a display; the oldest are forgotten.
+/// Most submitted frames whose end is awaited, more than a display queues; beyond it the oldest is dropped.
 const WAITING: usize = 8;
 
 /// A submitted frame.
@@ -45,14 +45,14 @@ impl Recent {
         self.0.push_back((frame, value));
     }
 
-    /// Those of the newest frames, of which `frame` is the last.
+    /// Durations of the last [`REMEMBERED`] frames up to `frame`.
     fn until(&self, frame: u64) -> impl Iterator<Item = Duration> {
         let newer = move |(of, _): &&(u64, Duration)| of + REMEMBERED as u64 > frame;
         self.0.iter().filter(newer).map(|(_, value)| *value)
     }
 }
 
-/// See the module.
+/// Timestamps of the recent frames, and what follows from them.
 #[derive(Debug, Default)]
 pub struct Pacer {
     /// End of the last frame.
@@ -63,16 +63,19 @@ pub struct Pacer {
     frames: u64,
     /// Mark of the newest frame.
     newest: u64,
+    /// Mark and submission of the newest frame, and of the one before it.
+    last: Option<(u64, u64)>,
+    before: Option<(u64, u64)>,
     /// Submitted frames, oldest first.
     waiting: VecDeque<Frame>,
     /// Time of frames from the end of the frame before to their submission.
     work: Recent,
-    /// Times between the ends of two frames that were both waited for: no frame came late, so that these are the times
-    /// of the GPU or of the display.
+    /// Times between the ends of two successive frames that the CPU waited for: it was not the bottleneck, so these are
+    /// frame times of the GPU or intervals of the display.
     intervals: Recent,
-    /// Times of the GPU for a frame, where both ends are known and they are not the frames' ends.
+    /// GPU times of frames; only known where a frame ends on the display.
     gpu: Recent,
-    /// When the GPU had finished the last frame of which that is known.
+    /// End of the last frame that the GPU is known to have finished.
     drawn: Option<Instant>,
     /// End of the last frame if it was waited for.
     ended: Option<Instant>,
@@ -93,6 +96,7 @@ impl Pacer {
         self.work
             .add(self.frames, now.saturating_duration_since(free));
         self.newest = mark;
+        self.before = self.last.replace((mark, submission));
         if self.waiting.len() == WAITING {
             self.waiting.pop_front();
         }
@@ -105,10 +109,9 @@ impl Pacer {
         });
     }
 
-    /// Mark and submission of the frame before the newest, if it is not known to have ended.
+    /// Mark and submission of the frame before the newest, whether or not it has ended.
     pub fn before_newest(&self) -> Option<(u64, u64)> {
-        let frame = self.waiting.iter().nth_back(1)?;
-        Some((frame.mark, frame.submission))
+        self.before
     }
 
     /// The mark of the newest frame; 0 before the first.
@@ -153,10 +156,10 @@ impl Pacer {
         }
     }
 
-    /// How long the engine is kept after the frame before the newest has ended, so that it has its next frame ready
-    /// just when the newest ends. Nothing if that end was not waited for: then the GPU has no work but the newest
-    /// frame. Nothing either if the GPU takes longer for a frame than the display shows it: it would then be idle between the
-    /// end of its work and the display's next picture.
+    /// Delay of the engine after the frame before the newest has ended, so that its next frame is ready just when the
+    /// newest ends: the shortest interval minus the longest CPU work and a margin. Zero if the CPU did not have to wait for
+    /// that end: then it is the bottleneck. Zero too if a frame of the GPU takes longer than an interval of the display:
+    /// the GPU would be idle until the display's next refresh.
     pub fn rest(&self) -> Duration {
         let least = self.intervals.until(self.frames).min();
         let greatest = self.work.until(self.frames).max();
@@ -176,9 +179,10 @@ impl Pacer {
         self.begun = None;
     }
 
-    /// A frame that is not shown, or whose end will not be known: nothing is known of the pace.
+    /// Drops all awaited frames: a frame is not shown, or its end cannot be observed.
     pub fn forget(&mut self) {
         self.waiting.clear();
+        (self.last, self.before) = (None, None);
         self.drawn = None;
         self.ended = None;
         self.free = None;

@@ -27,7 +27,7 @@ struct Result {
     latency: [f64; 2],
     /// The 99th percentile as the pacer reports it.
     reported: f64,
-    /// 99th percentile of what is left of it without the frame's own times of CPU and GPU, or CPU and display.
+    /// 99th percentile of the latency minus the frame's own CPU time and the larger of GPU time and display interval.
     excess: f64,
 }
 

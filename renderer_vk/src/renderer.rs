@@ -129,8 +129,8 @@ pub struct Renderer {
     pacer: Pacer,
     /// Frames end when the display shows them; otherwise, when they are drawn.
     paced_by_display: bool,
-    /// A frame was waited for in vain.
-    display_sleeps: bool,
+    /// The last wait for the display timed out, and no frame has been shown since.
+    wait_timed_out: bool,
     hides_overlay: bool,
 }
 
@@ -243,7 +243,7 @@ impl Renderer {
             hidden: false,
             pacer: Pacer::default(),
             paced_by_display: false,
-            display_sleeps: false,
+            wait_timed_out: false,
             hides_overlay: false,
         })
     }

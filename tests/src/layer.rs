@@ -59,7 +59,7 @@ pub struct Session {
     pub fault: Option<String>,
     /// Sizes that the window has one after the other, `WIDTHxHEIGHT`; 0x0 is minimised.
     pub sizes: Vec<&'static str>,
-    /// A display that says when it shows a picture: milliseconds between two, or `mute`, if it does not say it after all.
+    /// Emulated `VK_KHR_present_wait`: refresh interval of the display in milliseconds, or `mute`: waits time out.
     pub display: Option<&'static str>,
     /// Arguments of the program `session`.
     pub arguments: Vec<String>,
@@ -78,6 +78,10 @@ pub struct Outcome {
     pub errors: Vec<String>,
     /// Calls of each function, and the results that it may return.
     pub calls: BTreeMap<String, (u32, Vec<String>)>,
+    /// With a display: for each acquired image, the number of pictures that were presented and not shown yet.
+    pub queued: Vec<usize>,
+    /// With a display: number of waits for it with a timeout above zero.
+    pub waits: usize,
     /// Functions that the layer does not know.
     pub unknown: Vec<String>,
     /// Whether the fault occurred.
@@ -187,6 +191,8 @@ fn read(text: String, failure: Option<String>, log: &str) -> Outcome {
         ended: after("ended: ").pop(),
         errors: after("error: "),
         calls: BTreeMap::new(),
+        queued: Vec::new(),
+        waits: 0,
         unknown: Vec::new(),
         struck: false,
         pictures: BTreeMap::new(),
@@ -197,6 +203,8 @@ fn read(text: String, failure: Option<String>, log: &str) -> Outcome {
         match words[..] {
             ["unknown", function] => outcome.unknown.push(function.to_owned()),
             ["struck", ..] => outcome.struck = true,
+            ["queued", number] => outcome.queued.extend(number.parse::<usize>().ok()),
+            ["waits"] => outcome.waits += 1,
             [function, number, results] => {
                 let results = results.split(',').filter(|r| !r.is_empty());
                 let call = outcome.calls.entry(function.to_owned()).or_default();

@@ -286,16 +286,7 @@ fn a_window_may_be_minimised_and_resized_in_every_frame() {
     assert!(made >= 6, "{made} swapchains for 6 sizes");
 }
 
-/// The milliseconds that follow `mark` in a session's output.
-fn milliseconds(outcome: &Outcome, mark: &str) -> f64 {
-    let found = outcome.text.split_once(mark).and_then(|(_, rest)| {
-        let number = rest.split_once(" ms")?.0;
-        number.trim().parse().ok()
-    });
-    found.unwrap_or_else(|| panic!("no {mark}: {}", outcome.text))
-}
-
-/// A session whose display says when it shows a picture.
+/// A session on a display of the layer: its interval in milliseconds, or `mute`.
 fn on_display(display: &'static str, low_latency: &str, frames: &str) -> Session {
     let more = [
         "--costs",
@@ -310,7 +301,7 @@ fn on_display(display: &'static str, low_latency: &str, frames: &str) -> Session
         .chain(["--set", "r_lowLatency", low_latency]);
     Session {
         display: Some(display),
-        // a device that does not put off showing
+        // no software device, for which presenting is deferred
         profiles: vec![profile("ampere")],
         arguments: [looks("c"), more.map(str::to_owned).collect()].concat(),
         ..Session::default()
@@ -318,11 +309,11 @@ fn on_display(display: &'static str, low_latency: &str, frames: &str) -> Session
 }
 
 #[test]
-fn one_frame_waits_for_the_display_where_it_says_when_it_shows_one() {
+fn at_most_one_frame_waits_for_a_display_that_is_observed() {
     if !available() {
         return;
     }
-    let latency = |low_latency| {
+    for (low_latency, most) in [("0", 2), ("1", 1), ("2", 1)] {
         let outcome = play(&on_display("40", low_latency, "60"));
         assert_eq!(
             (&outcome.failure, &outcome.ended, outcome.errors.len()),
@@ -330,14 +321,12 @@ fn one_frame_waits_for_the_display_where_it_says_when_it_shows_one() {
             "{}",
             outcome.text
         );
-        let median = milliseconds(&outcome, "frames: median ");
-        println!("r_lowLatency {low_latency}: {median} ms in the median");
-        median
-    };
-    let [two, one] = ["0", "1"].map(latency);
-    // three and two intervals of the display
-    assert!(one < two - 20.0, "{one} ms with one, {two} ms with two");
-    assert!(latency("2") < two - 20.0);
+        let queued = &outcome.queued;
+        println!("r_lowLatency {low_latency}: {queued:?}");
+        assert!(queued.len() > 60 && queued.iter().all(|n| *n <= most));
+        let printed = outcome.text.contains("from input until shown, ");
+        assert!(printed, "{}", outcome.text);
+    }
 }
 
 #[test]
@@ -347,11 +336,10 @@ fn a_display_that_shows_nothing_does_not_hold_the_game() {
     }
     let outcome = play(&on_display("mute", "2", "60"));
     assert_eq!(outcome.failure, None, "{}", outcome.text);
-    let waits = outcome.calls.get("vkWaitForPresentKHR").map_or(0, |c| c.0);
-    assert!(waits > 60, "{waits} calls");
-    // a wait for each would take 15 s
-    let passed = milliseconds(&outcome, "frames: 60 in ");
-    assert!(passed < 5000.0, "{passed} ms");
+    let polls = outcome.calls.get("vkWaitForPresentKHR").map_or(0, |c| c.0);
+    assert!(polls > 60, "{polls} calls");
+    // the renderer after the restart draws a single frame, which has none before it
+    assert_eq!(outcome.waits, 1, "waits of a quarter of a second");
 }
 
 #[test]

@@ -26,11 +26,7 @@ impl CompactedSizes {
     /// # Errors
     /// A lost device.
     pub fn sizes(&self) -> Result<Option<Vec<u64>>, Error> {
-        let timeline = self.device.0.timeline;
-        // SAFETY: the timeline belongs to this device.
-        let done = unsafe { self.device.vk().get_semaphore_counter_value(timeline) }
-            .context("vkGetSemaphoreCounterValue")?;
-        if done < self.frame {
+        if self.device.0.finished()? < self.frame {
             return Ok(None);
         }
         let mut sizes = vec![0u64; self.count];

@@ -441,12 +441,19 @@ impl DeviceInner {
         state.graveyard.push((tag, garbage));
     }
 
+    /// The newest submission that the GPU has finished.
+    ///
+    /// # Errors
+    /// Out of memory, device loss.
+    pub fn finished(&self) -> Result<u64, Error> {
+        // SAFETY: the timeline belongs to this device.
+        unsafe { self.core.raw.get_semaphore_counter_value(self.timeline) }
+            .context("vkGetSemaphoreCounterValue")
+    }
+
     /// Destroys buried objects that no frame uses.
     pub fn collect(&self) -> Result<(), Error> {
-        // SAFETY: the timeline belongs to this device.
-        let done = unsafe { self.core.raw.get_semaphore_counter_value(self.timeline) }
-            .context("vkGetSemaphoreCounterValue")?;
-        let mut dead = lock(&self.state).take_dead(done);
+        let mut dead = lock(&self.state).take_dead(self.finished()?);
         for garbage in dead.drain(..) {
             self.destroy(garbage);
         }

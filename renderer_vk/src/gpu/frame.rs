@@ -128,6 +128,14 @@ impl FrameRing {
         lock(&self.device.0.state).submitted
     }
 
+    /// The newest submission that the GPU has finished.
+    ///
+    /// # Errors
+    /// Out of memory, device loss.
+    pub fn finished(&self) -> Result<u64, Error> {
+        self.device.0.finished()
+    }
+
     /// Waits until the GPU has finished a submission, as [`newest`](Self::newest) counts them, and all before it; at most
     /// `timeout`. `false`: it has not.
     ///

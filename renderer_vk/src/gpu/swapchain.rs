@@ -1,5 +1,7 @@
 //! The swapchain of the window.
 
+mod choices;
+
 use std::time::Duration;
 
 use ash::vk;
@@ -11,69 +13,12 @@ use super::graveyard::Garbage;
 use super::image::{Format, Image, layout_change};
 use super::recorder::{Acquired, Recorder};
 use super::window_format::{Encoding, WindowFormat};
+pub use choices::SwapchainDesc;
+use choices::{composite_alpha, image_count};
 
 /// Timeout of image acquisition, nanoseconds. Window systems withhold images of invisible windows; the game continues
 /// without presenting.
 const PATIENCE: u64 = 500_000_000;
-
-/// Parameters of a [`Swapchain`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SwapchainDesc {
-    /// Width, pixels, unless the window system dictates the size.
-    pub width: u32,
-    /// Height, pixels.
-    pub height: u32,
-    /// Waits for vertical blank.
-    pub vsync: bool,
-    /// Encodings of more than white that are wanted, the best first.
-    pub wide: &'static [Encoding],
-}
-
-impl SwapchainDesc {
-    fn present_mode(&self, offered: &[vk::PresentModeKHR]) -> vk::PresentModeKHR {
-        let unsynchronized = [vk::PresentModeKHR::IMMEDIATE, vk::PresentModeKHR::MAILBOX];
-        let found = unsynchronized.into_iter().find(|m| offered.contains(m));
-        found
-            .filter(|_| !self.vsync)
-            .unwrap_or(vk::PresentModeKHR::FIFO)
-    }
-
-    /// Size of the images.
-    fn extent(&self, caps: &vk::SurfaceCapabilitiesKHR) -> vk::Extent2D {
-        let (least, most) = (caps.min_image_extent, caps.max_image_extent);
-        // This value means that the swapchain determines the size.
-        if caps.current_extent.width != u32::MAX {
-            return caps.current_extent;
-        }
-        vk::Extent2D {
-            width: self.width.max(least.width).min(most.width),
-            height: self.height.max(least.height).min(most.height),
-        }
-    }
-}
-
-/// Three images, or one more than the window system's minimum.
-fn image_count(caps: &vk::SurfaceCapabilitiesKHR) -> u32 {
-    let count = caps.min_image_count.saturating_add(1).max(3);
-    match caps.max_image_count {
-        // no maximum
-        0 => count,
-        most => count.min(most),
-    }
-}
-
-/// Opaque if the window system supports it.
-fn composite_alpha(caps: &vk::SurfaceCapabilitiesKHR) -> vk::CompositeAlphaFlagsKHR {
-    [
-        vk::CompositeAlphaFlagsKHR::OPAQUE,
-        vk::CompositeAlphaFlagsKHR::INHERIT,
-        vk::CompositeAlphaFlagsKHR::PRE_MULTIPLIED,
-        vk::CompositeAlphaFlagsKHR::POST_MULTIPLIED,
-    ]
-    .into_iter()
-    .find(|a| caps.supported_composite_alpha.contains(*a))
-    .unwrap_or(vk::CompositeAlphaFlagsKHR::OPAQUE)
-}
 
 /// What is known of a presentation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,7 +27,7 @@ pub enum Presented {
     Shown,
     /// It is not, at the end of the time to wait.
     NotYet,
-    /// It will not be known: of an earlier swapchain, or out of date.
+    /// Cannot be observed: it belongs to an earlier swapchain, or is out of date.
     Unknown,
 }
 
@@ -311,7 +256,7 @@ impl Swapchain {
 
     /// Whether [`wait_presented`](Self::wait_presented) can be called, and presenting waits for the display: without
     /// vertical synchronization a picture is shown once it is drawn, and window systems differ in what they report.
-    pub fn reports(&self) -> bool {
+    pub fn observes_display(&self) -> bool {
         self.device.0.present_wait.is_some() && self.synchronized
     }
 

@@ -1,47 +1,65 @@
-//! `r_lowLatency`: at the end of a frame, waits for the frame before. [`Pacer`] measures and
-//! decides.
+//! `r_lowLatency`: waits for the frame before at the end of a frame. [`Pacer`] computes how long.
 
 use std::time::{Duration, Instant};
 
 use super::Renderer;
 use crate::error::Error;
-use crate::gpu::Presented;
+use crate::gpu::{Presented, Swapchain};
 use crate::pacing::Pacer;
 use crate::settings::LowLatency;
 use crate::statistics::Latency;
 
-/// Longest wait for a frame. A window system may show the pictures of a covered window never, or once a second; after
-/// one such wait there is none until a frame is seen to have ended.
-const PATIENCE: Duration = Duration::from_millis(250);
+/// Timeout of a wait for the display. A window system may show a covered window never, or once a second: after a timeout
+/// nothing is waited for until a poll finds that a frame has ended.
+const LONGEST_WAIT: Duration = Duration::from_millis(250);
 
 impl Renderer {
     /// Whether a frame ends when the display shows it; otherwise, when it is drawn.
     fn ends_on_display(&self) -> bool {
-        self.swapchain.as_ref().is_some_and(|s| s.reports())
+        self.swapchain
+            .as_ref()
+            .is_some_and(Swapchain::observes_display)
     }
 
-    /// What is known of the end of a frame after at most `timeout`.
-    fn ended(&mut self, mark: u64, timeout: Duration) -> Result<Presented, Error> {
-        Ok(match &mut self.swapchain {
-            Some(swapchain) if self.paced_by_display => swapchain.wait_presented(mark, timeout)?,
-            _ if self.ring.wait(mark, timeout)? => Presented::Shown,
-            _ => Presented::NotYet,
-        })
-    }
-
-    /// Notes the frames that have ended.
+    /// Polls which frames have ended.
     pub(super) fn look_for_ends(&mut self) -> Result<(), Error> {
+        let Some(swapchain) = &mut self.swapchain else {
+            return Ok(());
+        };
+        if !self.paced_by_display {
+            self.pacer.end(self.ring.finished()?, Instant::now());
+            return Ok(());
+        }
         while let Some(mark) = self.pacer.oldest() {
-            match self.ended(mark, Duration::ZERO)? {
+            match swapchain.wait_presented(mark, Duration::ZERO)? {
                 Presented::Shown => {
                     self.pacer.end(mark, Instant::now());
-                    self.display_sleeps = false;
+                    self.wait_timed_out = false;
                 }
                 Presented::NotYet => break,
                 Presented::Unknown => self.pacer.forget(),
             }
         }
         Ok(())
+    }
+
+    /// Waits for the end of a frame, and whether that took time.
+    fn wait_for_end(&mut self, mark: u64) -> Result<(Presented, bool), Error> {
+        match &mut self.swapchain {
+            Some(swapchain) if self.paced_by_display => {
+                let now = swapchain.wait_presented(mark, Duration::ZERO)?;
+                Ok(match now {
+                    Presented::NotYet => (swapchain.wait_presented(mark, LONGEST_WAIT)?, true),
+                    _ => (now, false),
+                })
+            }
+            _ => {
+                let waits = self.ring.finished()? < mark;
+                // what the GPU draws comes to an end, as for the next frame's slot of the ring
+                self.ring.wait(mark, Duration::MAX)?;
+                Ok((Presented::Shown, waits))
+            }
+        }
     }
 
     /// Ends a frame that was submitted to be shown, by waiting.
@@ -53,7 +71,7 @@ impl Renderer {
             _ => submission,
         };
         if by_display != self.paced_by_display {
-            // other marks
+            // marks were presentations and are submissions now, or the reverse
             self.paced_by_display = by_display;
             self.pacer = Pacer::default();
         }
@@ -63,7 +81,7 @@ impl Renderer {
             return Ok(());
         }
         self.pacer.submit(mark, submission, Instant::now());
-        if self.settings.low_latency != LowLatency::Off && !self.display_sleeps {
+        if self.settings.low_latency != LowLatency::Off && !self.wait_timed_out {
             self.wait_for_frame_before()?;
             if self.settings.low_latency == LowLatency::JustInTime {
                 self.rest(submission)?;
@@ -79,22 +97,18 @@ impl Renderer {
         if let Some((mark, submission)) = self.pacer.before_newest() {
             if self.paced_by_display
                 && !self.ring.wait(submission, Duration::ZERO)?
-                && self.ring.wait(submission, PATIENCE)?
+                && self.ring.wait(submission, LONGEST_WAIT)?
             {
                 self.pacer.draw(submission, Instant::now());
             }
-            let mut end = self.ended(mark, Duration::ZERO)?;
-            let waits = end == Presented::NotYet;
-            if waits {
-                end = self.ended(mark, PATIENCE)?;
-            }
+            let (end, waits) = self.wait_for_end(mark)?;
             let then = Instant::now();
             match end {
                 Presented::Shown => {
                     self.pacer.end(mark, then);
                     now = waits.then_some(then);
                 }
-                Presented::NotYet => self.display_sleeps = true,
+                Presented::NotYet => self.wait_timed_out = true,
                 Presented::Unknown => self.pacer.forget(),
             }
         }
@@ -102,9 +116,9 @@ impl Renderer {
         Ok(())
     }
 
-    /// Keeps the engine until its next frame is needed.
+    /// Delays the engine until its next frame is needed.
     fn rest(&mut self, submission: u64) -> Result<(), Error> {
-        let rest = self.pacer.rest().min(PATIENCE);
+        let rest = self.pacer.rest().min(LONGEST_WAIT);
         if rest.is_zero() {
             return Ok(());
         }
@@ -124,8 +138,7 @@ impl Renderer {
         self.pacer.latency(self.end_name())
     }
 
-    /// What a frame's end is, and the milliseconds from the end of the frame before to it, of the newest frame of which
-    /// they are known.
+    /// Latency of the newest frame that has ended, milliseconds, and what its end is: `shown` or `drawn`.
     pub fn newest_latency(&self) -> Option<(&'static str, f32)> {
         Some((self.end_name(), self.pacer.newest_latency()?))
     }

@@ -1,7 +1,7 @@
-//! A display, of which the window system says when it shows a picture: `VK_KHR_present_id` and
-//! `VK_KHR_present_wait`, which software drivers do not have. `RELIGHT_LAYER_DISPLAY` is the time between two of its pictures in milliseconds; each
-//! picture is shown in turn, and at most two wait. With `mute` it never says that it has shown one, as the display of a
-//! covered window.
+//! Emulates `VK_KHR_present_id` and `VK_KHR_present_wait`, which software drivers lack. `RELIGHT_LAYER_DISPLAY` is the
+//! display's refresh interval in milliseconds; it shows presented pictures in order, and queues at most two. With `mute`
+//! waits always time out, as for a covered window. The log gets a line `queued N` for each acquisition, N: pictures that
+//! are presented and not shown yet; and a line `waits` for each wait with a timeout above zero.
 
 use std::collections::VecDeque;
 use std::ffi::{CStr, c_char};
@@ -37,6 +37,8 @@ struct Shown {
     waiting: VecDeque<(u64, Instant)>,
     /// Number of the last picture that is not in the list.
     number: u64,
+    /// The swapchain of these pictures.
+    swapchain: vk::SwapchainKHR,
 }
 
 static SHOWN: LazyLock<Mutex<Shown>> = LazyLock::new(|| {
@@ -44,6 +46,7 @@ static SHOWN: LazyLock<Mutex<Shown>> = LazyLock::new(|| {
         start: Instant::now(),
         waiting: VecDeque::new(),
         number: 0,
+        swapchain: vk::SwapchainKHR::null(),
     })
 });
 
@@ -246,7 +249,15 @@ pub unsafe extern "system" fn acquire(
     }
     let room = {
         let mut shown = shown();
+        if shown.swapchain != swapchain {
+            // what an earlier one has presented is not shown any more
+            shown.swapchain = swapchain;
+            shown.waiting.clear();
+        }
         shown.pass(Instant::now());
+        if DISPLAY.is_some() {
+            faults::log(&format!("queued {}", shown.waiting.len()));
+        }
         let full = shown.waiting.len().checked_sub(WAITING);
         full.and_then(|place| shown.waiting.get(place).map(|(_, time)| *time))
     };
@@ -281,6 +292,9 @@ pub unsafe extern "system" fn wait(
     let Some(display) = *DISPLAY else {
         return next_wait(&chain, device, swapchain, number, timeout);
     };
+    if timeout > 0 {
+        faults::log("waits");
+    }
     let now = Instant::now();
     let time = match display {
         Display::Mute => None,

@@ -5,7 +5,7 @@
 //! * `RELIGHT_LAYER_FAULT`: `FUNCTION NUMBER RESULT`. That call of the function, counted from 1, fails with the result
 //!   ([`faults`]).
 //! * `RELIGHT_LAYER_SIZES`: sizes of the window ([`window`]).
-//! * `RELIGHT_LAYER_DISPLAY`: a display that says when it shows a picture ([`display`]).
+//! * `RELIGHT_LAYER_DISPLAY`: emulates `VK_KHR_present_wait` ([`display`]).
 //! * `RELIGHT_LAYER_LOG`: a file that gets a line `FUNCTION NUMBER` for each call that returns a `VkResult`, and a line
 //!   `unknown EXTENSION` for each extension that the application enables and whose functions the layer does not know.
 //!
