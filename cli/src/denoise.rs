@@ -1,4 +1,4 @@
-//! `relight render --denoise`: an accumulated picture without its noise, by Open Image Denoise.
+//! `relight render --denoise`: filters the accumulated picture by Open Image Denoise.
 
 use std::path::PathBuf;
 
@@ -78,8 +78,8 @@ impl Denoiser {
     ) -> Result<()> {
         let color = renderer.read_radiance()?;
         let (width, height) = renderer.size();
-        // Without light, the picture is the albedo of what is lit, and the colour of sky, flames and other things that
-        // are not: it has the patterns of both, and no noise.
+        // The albedo guide is the picture without illumination: the albedo of lit surfaces, and the emission of sky and
+        // flames. It has the texture detail of the picture, and no noise of light.
         let unlit = Settings {
             rt_illumination: false,
             rt_bounces: 0,
@@ -101,7 +101,7 @@ impl Denoiser {
             }
             normals.add(shown.into_iter());
         }
-        // the frames that showed normals are in its mean
+        // `rt_debug` does not restart the mean: the frames drawn for the normals already accumulated without illumination
         renderer.set_settings(&unlit);
         draw(renderer)?;
         let shown = renderer.read_pixels()?;
@@ -116,7 +116,7 @@ impl Denoiser {
         let filtered = self.oidn.denoise(size, &color, Some(guides))?;
         let mixed = mixed(&color, &filtered, &lit);
         renderer.set_settings(settings);
-        // the guides' frames have ended the mean; a new one begins, which the filtered picture replaces
+        // the settings of the guides restarted the mean; one frame begins a new one, which the filtered picture replaces
         draw(renderer)?;
         ensure!(
             renderer.replace_radiance(&mixed)?,
@@ -126,8 +126,8 @@ impl Denoiser {
     }
 }
 
-/// The filtered colour by the share of a pixel that is lit. The rest has no noise of light, and a filter could only blur
-/// it: sky, flames, screens.
+/// Mixes the filtered colour in by the lit fraction of each pixel. Sky, flames and screens have no noise of light: a
+/// filter could only blur them.
 fn mixed(color: &[Texel], filtered: &[Texel], lit: &[f32]) -> Vec<Texel> {
     let pixels = color.iter().zip(filtered).zip(lit);
     pixels

@@ -1,12 +1,12 @@
-//! What surfaces a picture shows, read from the views of `rt_debug`.
+//! Albedo, normal and distance of the surfaces in a picture, decoded from the views of `rt_debug`.
 
 use relight::overbright;
 
 /// Colour or direction of a pixel.
 pub type Texel = [f32; 3];
 
-/// Decodes the albedo that `rt_debug 1` shows, linear; black where no surface is lit. Also the picture of
-/// `rt_illumination 0`, which has the colour of what is not lit as well.
+/// Decodes the albedo that `rt_debug 1` shows, linear; black where no surface is lit. The picture of `rt_illumination 0`
+/// has the same encoding, and shows the emission of unlit surfaces too.
 pub fn albedo() -> impl Fn(&[u8]) -> Texel {
     let linear = overbright::byte_table();
     move |rgb| std::array::from_fn(|k| linear[usize::from(rgb[k])])

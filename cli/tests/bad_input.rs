@@ -211,7 +211,7 @@ fn a_pack_with_everything_below_one_folder_names_the_folder() {
 }
 
 #[test]
-fn an_absent_denoiser_is_told_with_the_remedy() {
+fn a_missing_denoiser_is_reported_with_the_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |more: &[&str]| {
         let usual = ["render", "--sample", "-o", "out.png", "--denoise", "oidn"];
@@ -224,7 +224,7 @@ fn an_absent_denoiser_is_told_with_the_remedy() {
     for part in ["install it", "--oidn", "nowhere/libOpenImageDenoise.so.2: "] {
         assert!(text.contains(part), "{text}");
     }
-    // not even looked for
+    // refused before the library is looked for
     let wrong = |more: &[&str], part: &str| {
         let text = refused(more);
         assert!(text.contains(part), "{text}");

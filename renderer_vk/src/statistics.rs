@@ -116,8 +116,8 @@ pub struct Costs {
 }
 
 /// Times from input to picture of the newest frames, milliseconds. The engine reads input after a frame's end and
-/// before the next frame's first call: the true times lie between both. An end that no one waited for is noted late, by
-/// at most the part of a frame's work between two looks.
+/// before the next frame's first call: the true times lie between both. The end of a frame that was not waited for is
+/// only observed at the next poll, several times a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Latency {
     /// `shown`, on the display (`VK_KHR_present_wait`), or `drawn`, by the GPU.
@@ -132,7 +132,7 @@ pub struct Latency {
 
 impl Latency {
     fn line(&self) -> String {
-        let of = |spread: &Spread| format!("{:.1} ms, 99 of 100 {:.1}", spread.median, spread.p99);
+        let of = |spread: &Spread| format!("{:.1} ms, p99 {:.1}", spread.median, spread.p99);
         format!(
             "from input until {}, {} frames: median {} from the end of the frame before, {} from the first call",
             self.to,
@@ -233,7 +233,7 @@ impl Costs {
             let (to, from) = (latency.to, latency.from_end);
             let _ = write!(
                 line,
-                "; {to} after {:.1} ms, 99 of 100 {:.1}",
+                "; {to} after {:.1} ms, p99 {:.1}",
                 from.median, from.p99
             );
         }

@@ -2,11 +2,14 @@
 //!
 //! Without a device the tests are skipped; with `RELIGHT_REQUIRE_GPU=1` they fail.
 
+mod common;
+
 use std::sync::Arc;
 
+use common::{frame, load_sample};
 use glam::Vec2;
-use relight::{GameFiles, MemoryFiles, sample, viewpoints};
-use renderer_vk::api::{Picture, RefDef, UiFrame, UiMesh, UiTexture, UiVertex};
+use relight::{GameFiles, MemoryFiles};
+use renderer_vk::api::{Picture, UiFrame, UiMesh, UiTexture, UiVertex};
 use renderer_vk::{HdrChoice, Renderer, RendererOptions, Settings};
 
 const SIZE: (u32, u32) = (96, 54);
@@ -131,7 +134,6 @@ fn display_values_have_the_brightness_of_white_and_its_parts() {
 /// Frames of the sample's first spawn point; the picture and what a window shows.
 fn traced(hdr: HdrChoice) -> Option<(Picture, Vec<[f32; 3]>)> {
     let mut renderer = renderer(hdr)?;
-    let files: Arc<dyn GameFiles> = Arc::new(sample::files().unwrap());
     let settings = Settings {
         rt: true,
         rt_accumulate: true,
@@ -141,24 +143,9 @@ fn traced(hdr: HdrChoice) -> Option<(Picture, Vec<[f32; 3]>)> {
         hdr_peak: PEAK,
         ..Settings::full_size()
     };
-    renderer.begin_registration(files, &settings).unwrap();
-    renderer.load_world(sample::MAP).unwrap();
-    renderer.end_registration();
-    let entities = renderer.world().unwrap().relit.bsp.entities();
-    let view = viewpoints::spawn_views(&entities).next().unwrap();
-    let def = RefDef {
-        width: SIZE.0 as i32,
-        height: SIZE.1 as i32,
-        fov_x: 90.0,
-        fov_y: 58.7,
-        view_origin: view.origin,
-        view_axis: view.axis(),
-        ..RefDef::default()
-    };
+    let def = load_sample(&mut renderer, &settings, SIZE);
     for _ in 0..2 {
-        renderer.begin_frame(0);
-        renderer.render_scene(&def).unwrap();
-        renderer.end_frame().unwrap();
+        frame(&mut renderer, &def);
     }
     let shown = renderer.read_presented().unwrap();
     let picture = renderer.read_pixels().unwrap();

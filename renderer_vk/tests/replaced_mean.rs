@@ -2,19 +2,13 @@
 //!
 //! Without a device the test is skipped; with `RELIGHT_REQUIRE_GPU=1` it fails.
 
-use std::sync::Arc;
+mod common;
 
-use relight::{GameFiles, sample, viewpoints};
+use common::{frame, load_sample};
 use renderer_vk::api::RefDef;
 use renderer_vk::{Renderer, RendererOptions, Settings};
 
 const SIZE: (u32, u32) = (64, 36);
-
-fn frame(renderer: &mut Renderer, def: &RefDef) {
-    renderer.begin_frame(0);
-    renderer.render_scene(def).unwrap();
-    renderer.end_frame().unwrap();
-}
 
 #[test]
 fn frames_show_the_given_mean_and_keep_it_until_their_content_changes() {
@@ -25,7 +19,6 @@ fn frames_show_the_given_mean_and_keep_it_until_their_content_changes() {
     let Some(mut renderer) = testkit::device(Renderer::new(options)) else {
         return;
     };
-    let files: Arc<dyn GameFiles> = Arc::new(sample::files().unwrap());
     let settings = Settings {
         rt: true,
         rt_accumulate: true,
@@ -34,20 +27,7 @@ fn frames_show_the_given_mean_and_keep_it_until_their_content_changes() {
         rt_auto_exposure: false,
         ..Settings::full_size()
     };
-    renderer.begin_registration(files, &settings).unwrap();
-    renderer.load_world(sample::MAP).unwrap();
-    renderer.end_registration();
-    let entities = renderer.world().unwrap().relit.bsp.entities();
-    let view = viewpoints::spawn_views(&entities).next().unwrap();
-    let def = RefDef {
-        width: SIZE.0 as i32,
-        height: SIZE.1 as i32,
-        fov_x: 90.0,
-        fov_y: 58.7,
-        view_origin: view.origin,
-        view_axis: view.axis(),
-        ..RefDef::default()
-    };
+    let def = load_sample(&mut renderer, &settings, SIZE);
     let pixels = (SIZE.0 * SIZE.1) as usize;
     // black on the left, white on the right
     let given: Vec<[f32; 3]> = (0..pixels)

@@ -16,8 +16,8 @@ const uint TAIL_BITS = 0x1FFFu, TAIL_LIT = 1u << 13, TAIL_FIRST_PERSON = 1u << 1
 
 float stored_distance(float view_distance) { return clamp(view_distance, LEAST_DISTANCE, SKY_DISTANCE); }
 
-// The nearest half float, halves to even: images of half floats store it exactly, and equal distances as equal numbers;
-// left to themselves, drivers round in either direction.
+// The nearest half float, ties to even. Rounded here because drivers may round or truncate when they store to an R16F
+// image, and equal distances of two frames must be stored as equal numbers.
 uint half_bits(uint bits) { return bits + 0xFFFu + (bits >> 13 & 1u) & ~TAIL_BITS; }
 float as_half(float v) { return uintBitsToFloat(half_bits(floatBitsToUint(v))); }
 
@@ -46,7 +46,7 @@ float lit_distance_read(ivec2 pixel, uint tail) {
 // Rounded view distance of whatever the pixel shows; `SKY_DISTANCE`: the sky.
 float view_distance_read(ivec2 pixel) { return abs(imageLoad(images_r16f[VIEW.motion.view_distance], pixel).x); }
 
-// The same of the last frame; negative if the surface moved in the picture then.
+// Rounded view distance in the last frame; negative if the surface moved in the picture then.
 float last_view_distance_read(ivec2 pixel) { return imageLoad(images_r16f[VIEW.motion.last_view_distance], pixel).x; }
 
 #endif

@@ -67,7 +67,7 @@ pub fn run(args: &GrowthArgs) -> Result<()> {
     std::fs::create_dir_all(&args.output)
         .with_context(|| format!("{}: cannot be made", args.output.display()))?;
     let axes: Vec<Sizes> = match args.axis.is_empty() {
-        true => Axis::all().map(Sizes::from).collect(),
+        true => Axis::ALL.map(Sizes::from).to_vec(),
         false => args.axis.clone(),
     };
     let base = Settings {

@@ -48,7 +48,7 @@ numbered! {
         Off = 0,
         /// One.
         One = 1,
-        /// One, and the engine is kept until the GPU is about to need its next frame.
+        /// One, and the engine is delayed until the GPU is about to need its next frame.
         JustInTime = 2,
     }
 }

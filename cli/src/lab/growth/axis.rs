@@ -17,9 +17,8 @@ pub enum Axis {
     Mirrors,
 }
 
-/// An axis as people see it.
+/// Names and sizes of an axis.
 struct Description {
-    axis: Axis,
     name: &'static str,
     unit: &'static str,
     /// Its sizes by default.
@@ -30,71 +29,66 @@ struct Description {
 
 const EIGHT: &[f64] = &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
 
-const DESCRIPTIONS: [Description; 7] = [
-    Description {
-        axis: Axis::Pixels,
-        name: "pixels",
-        unit: "pixels of the picture",
-        sizes: &[0.25e6, 0.5e6, 1e6, 2e6, 4e6, 8e6],
-        limits: (256.0, 1e8),
-    },
-    Description {
-        axis: Axis::Lights,
-        name: "lights",
-        unit: "triangle lights in one hall, together of constant area",
-        sizes: &[1.0, 10.0, 100.0, 1000.0, 5000.0, 20_000.0],
-        limits: (1.0, 1e6),
-    },
-    Description {
-        axis: Axis::Triangles,
-        name: "triangles",
-        unit: "triangles of the hall's floor",
-        sizes: &[1e4, 3e4, 1e5, 3e5, 1e6, 3e6, 1e7],
-        limits: (2.0, 2e7),
-    },
-    Description {
-        axis: Axis::Entities,
-        name: "entities",
-        unit: "entities of a brush model with 12 triangles",
-        sizes: &[0.0, 10.0, 100.0, 1000.0, 10_000.0],
-        limits: (0.0, 1e5),
-    },
-    Description {
-        axis: Axis::Curves,
-        name: "curves",
-        unit: "fineness of 24 curved columns: 1 / r_subdivisions",
-        sizes: &[1.0 / 64.0, 1.0 / 16.0, 0.25, 1.0, 4.0],
-        limits: (1e-3, 100.0),
-    },
-    Description {
-        axis: Axis::Layers,
-        name: "layers",
-        unit: "translucent layers before the whole view",
-        sizes: EIGHT,
-        limits: (0.0, 64.0),
-    },
-    Description {
-        axis: Axis::Mirrors,
-        name: "mirrors",
-        unit: "mirrors that a view ray may pass between two facing ones (rt_maxDepth)",
-        sizes: EIGHT,
-        limits: (0.0, 16.0),
-    },
-];
-
 /// Proportion of pictures, width over height.
 const ASPECT: f64 = 16.0 / 9.0;
 
 impl Axis {
     /// All, in the order of the page.
-    pub fn all() -> impl Iterator<Item = Self> {
-        DESCRIPTIONS.iter().map(|d| d.axis)
-    }
+    pub const ALL: [Self; 7] = [
+        Self::Pixels,
+        Self::Lights,
+        Self::Triangles,
+        Self::Entities,
+        Self::Curves,
+        Self::Layers,
+        Self::Mirrors,
+    ];
 
-    fn description(self) -> &'static Description {
-        let [first, others @ ..] = &DESCRIPTIONS;
-        let found = others.iter().find(|d| d.axis == self);
-        found.unwrap_or(first)
+    fn description(self) -> Description {
+        match self {
+            Self::Pixels => Description {
+                name: "pixels",
+                unit: "pixels of the picture",
+                sizes: &[0.25e6, 0.5e6, 1e6, 2e6, 4e6, 8e6],
+                limits: (256.0, 1e8),
+            },
+            Self::Lights => Description {
+                name: "lights",
+                unit: "triangle lights in one hall, together of constant area",
+                sizes: &[1.0, 10.0, 100.0, 1000.0, 5000.0, 20_000.0],
+                limits: (1.0, 1e6),
+            },
+            Self::Triangles => Description {
+                name: "triangles",
+                unit: "triangles of the hall's floor",
+                sizes: &[1e4, 3e4, 1e5, 3e5, 1e6, 3e6, 1e7],
+                limits: (2.0, 2e7),
+            },
+            Self::Entities => Description {
+                name: "entities",
+                unit: "entities of a brush model with 12 triangles",
+                sizes: &[0.0, 10.0, 100.0, 1000.0, 10_000.0],
+                limits: (0.0, 1e5),
+            },
+            Self::Curves => Description {
+                name: "curves",
+                unit: "fineness of 24 curved columns: 1 / r_subdivisions",
+                sizes: &[1.0 / 64.0, 1.0 / 16.0, 0.25, 1.0, 4.0],
+                limits: (1e-3, 100.0),
+            },
+            Self::Layers => Description {
+                name: "layers",
+                unit: "translucent layers before the whole view",
+                sizes: EIGHT,
+                limits: (0.0, 64.0),
+            },
+            Self::Mirrors => Description {
+                name: "mirrors",
+                unit: "mirrors that a view ray may pass between two facing ones (rt_maxDepth)",
+                sizes: EIGHT,
+                limits: (0.0, 16.0),
+            },
+        }
     }
 
     /// Name on the command line.
@@ -168,15 +162,15 @@ pub fn parse_axis(text: &str) -> Result<Sizes, String> {
         Some((name, sizes)) => (name, Some(sizes)),
         None => (text, None),
     };
-    let found = DESCRIPTIONS.iter().find(|d| d.name == name);
-    let found = found.ok_or_else(|| {
-        let names: Vec<_> = DESCRIPTIONS.iter().map(|d| d.name).collect();
+    let axis = Axis::ALL.into_iter().find(|axis| axis.name() == name);
+    let axis = axis.ok_or_else(|| {
+        let names = Axis::ALL.map(Axis::name);
         format!("an axis is one of {}", names.join(", "))
     })?;
     let Some(sizes) = sizes else {
-        return Ok(found.axis.into());
+        return Ok(axis.into());
     };
-    let (low, high) = found.limits;
+    let (low, high) = axis.description().limits;
     let sizes: Option<Vec<f64>> =
         numbers::list(sizes).map(|list| list.into_iter().map(f64::from).collect());
     let mut sizes = sizes
@@ -186,10 +180,7 @@ pub fn parse_axis(text: &str) -> Result<Sizes, String> {
         })?;
     sizes.sort_by(f64::total_cmp);
     sizes.dedup();
-    Ok(Sizes {
-        axis: found.axis,
-        sizes,
-    })
+    Ok(Sizes { axis, sizes })
 }
 
 #[cfg(test)]
@@ -198,7 +189,7 @@ mod tests {
 
     #[test]
     fn axes_are_names_with_sizes() {
-        for axis in Axis::all() {
+        for axis in Axis::ALL {
             let sizes = parse_axis(axis.name()).unwrap();
             assert_eq!(sizes.axis, axis);
             assert!(sizes.sizes.len() >= 3 && sizes.sizes.is_sorted());
