@@ -41,10 +41,18 @@ TABLES = [
     ("light-lists-direct", "traced-look", "| map | lights | not culled",
      "map; lights; not culled [ms, squared noise / squared mean]; culled [ms, squared noise / squared mean]; "
      "ratio [ms times noise]", H100, "2026-11-27", "relight-lab estimators MAP --size 512x384"),
-    ("quality-places", "traced-look", "| picture | SSIM | FLIP",
-     "picture; SSIM; FLIP; noise at rest [median σ/μ]; light off [frames to 10 %]; moving light [SSIM]",
-     f"rows 1 and 3: {H100}; others: {H200}", "2026-11-24 (rows 1 and 3), 2026-11-23",
+    ("quality-places", "traced-look", "| picture | SSIM | least | FLIP",
+     "picture; SSIM; least [SSIM]; FLIP; noise at rest [median σ/μ]; light off [frames to 10 %]; moving light [SSIM]; "
+     "its trail [mean, most]", H100, "2026-11-27", "relight-lab measure MAP --reference 1024 --views 2"),
+    ("quality-shadows", "traced-look", "| picture | 0–128",
+     "picture; to 128 units [kept contrast]; to 256; to 512; to 1024; to 2048; beyond", H100, "2026-11-27",
      "relight-lab measure MAP --reference 1024 --views 2"),
+    ("quality-cut", "traced-look", "| picture | map | 1",
+     "picture; map; frame 1 [SSIM]; frame 2; frame 4; frame 8; frame 16; frame 32", H100, "2026-11-27",
+     "relight-lab measure MAP --reference 1024 --views 1 --cut"),
+    ("quality-samples", "traced-look", "| samples | none",
+     "samples; none [SSIM, FLIP]; TAA; A-SVGF; A-SVGF, TAA; sparse; sparse, TAA", H100, "2026-11-27",
+     "relight-lab measure oa_dm1 --reference 1024 --views 1 --matrix"),
     ("quality-mirrors", "traced-look", "| place | part |",
      "place; part; A-SVGF moving [SSIM, FLIP]; A-SVGF at rest [SSIM, FLIP]; TAA moving [SSIM, FLIP]; "
      "TAA at rest [SSIM, FLIP]", H200, "2026-11-22, one row 2026-11-23",
