@@ -1,7 +1,7 @@
 //! The two commands: `relight` for users of maps, `relight-lab` for measurements of the renderer.
 //!
 //! Each subcommand is a module. Subcommands of `relight`, and code of both commands, are here; subcommands of
-//! `relight-lab` are in [`lab`]. A binary calls [`relight`] or [`relight_lab`]; nothing else is public.
+//! `relight-lab` are in [`lab`]. A binary calls [`relight()`] or [`relight_lab`]; nothing else is public.
 
 #![forbid(unsafe_code)]
 
