@@ -9,6 +9,7 @@
 //! or shiny surface; `rt_debug 11`) and for the others. Light is compared before display: clipping at white and
 //! rounding to black change means; so is the contrast of shadows ([`shadows`]).
 
+mod bounces;
 mod clips;
 mod cut;
 mod matrix;
@@ -47,7 +48,7 @@ use crate::view::{Camera, load, map_name, open};
 /// For each place: similarity of the picture after a short turn of the camera (raw, denoised, denoised and antialiased,
 /// and a baseline with uniform light selection and a denoiser without gradients), contrast of shadows by their distance,
 /// noise over time at rest, frames until a light that was switched off has disappeared, and the trail of a moving light.
-/// With --cut, --matrix or --clips something else in place of it.
+/// With --cut, --matrix, --bounce-counts or --clips something else in place of it.
 ///
 /// Examples: relight-lab measure oa_dm1 kaos2 --reference 4096 -o out/measure; relight-lab measure oa_dm1 --cut;
 /// relight-lab measure oa_dm1 --clips out/clips --reference 1024 --picture denoised-taa
@@ -78,6 +79,9 @@ pub struct MeasureArgs {
     /// without temporal antialiasing
     #[arg(long, conflicts_with = "clips")]
     matrix: bool,
+    /// Error of 0, 1, 2 and 4 bounces against 8, each the mean of --reference frames
+    #[arg(long, conflicts_with_all = ["cut", "matrix", "clips"])]
+    bounce_counts: bool,
     /// Write pictures of a camera that walks from each place to this folder, and of the reference of each; lab/jod.py
     /// compares them
     #[arg(long, value_name = "DIR")]
@@ -132,6 +136,8 @@ impl MeasureArgs {
         if self.clips.is_some() {
             let shown = u64::from(self.clip_frames);
             variants * (frames + shown) + shown * reference
+        } else if self.bounce_counts {
+            bounces::frames(self.reference)
         } else if self.cut {
             reference + variants * cut::frames(self.frames)
         } else if self.matrix {
@@ -439,6 +445,9 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
                     variants: &args.variants(&base),
                 };
                 clip.write(&mut stage, &base, &folder.join(&name), &bar)?
+            } else if args.bounce_counts {
+                let frames = args.reference;
+                Value::Object(bounces::place(&mut stage, &base, camera, frames, &bar)?)
             } else if args.cut || args.matrix {
                 let (truth, _) = stage.reference(&base, camera, &[], args.reference, &bar)?;
                 match args.cut {
@@ -467,6 +476,8 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
         println!("{}", Value::Object(all));
     } else if args.clips.is_some() {
         all.keys().for_each(|name| println!("{name}"));
+    } else if args.bounce_counts {
+        bounces::print(&all);
     } else if args.cut {
         cut::print(&all);
     } else if args.matrix {

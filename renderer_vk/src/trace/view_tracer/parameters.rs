@@ -13,7 +13,7 @@ use super::{DARK_ADAPTATION, LIGHT_ADAPTATION, TracedView, ViewTracer, is_lit};
 use crate::gpu::{Error, Image, Recorder};
 use crate::raster::{FlareTest, WIDE_FORMAT};
 use crate::scene::{SUN_SIZE, TracedScene, perpendicular};
-use crate::settings::Settings;
+use crate::settings::{MOST_BOUNCES, Settings};
 use crate::trace::accel::AccelOutput;
 use crate::trace::beyond_sky::Beyond;
 use crate::trace::layer_boxes::in_sight;
@@ -244,7 +244,7 @@ fn transport(rec: &mut Recorder, traced: &TracedView<'_>) -> Result<TransportVie
         beyond_count: u32::try_from(beyond.boxes.len()).unwrap_or(u32::MAX),
         beyond_surface_count: u32::try_from(32 * beyond.surfaces.len()).unwrap_or(u32::MAX),
         max_depth: settings.rt_max_depth,
-        bounces: settings.rt_bounces.min(2),
+        bounces: settings.rt_bounces.min(MOST_BOUNCES),
     })
 }
 
