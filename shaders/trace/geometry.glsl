@@ -84,6 +84,29 @@ bool is_culled(SurfacePoint p, vec3 direction) {
     return from_front == ((material_flags & MATERIAL_CULL_BACK) != 0);
 }
 
+// Farthest that `curved_position` moves a point, units: less than the thickness of walls.
+const float MOST_CURVED = 4.0;
+
+// The point of the curved surface that a triangle approximates, on the side of `face`. Light gathered there is not
+// shadowed by the facets of the same surface, which would show along the terminator (Hanika, Hacking the Shadow
+// Terminator, Ray Tracing Gems II, chapter 4). Where the surface is concave on that side, the point stays.
+vec3 curved_position(SurfacePoint p, vec3 face) {
+    if ((p.triangle.flags & TRIANGLE_CURVED) == 0) return p.position;
+    TraceVertices vertices = TraceVertices(p.vertices);
+    Instance instance = instance_of(p.instance);
+    mat3 axis = mat3(instance.axis[0], instance.axis[1], instance.axis[2]);
+    float side = dot(p.face_normal, face) < 0.0 ? -1.0 : 1.0;
+    vec3 moved = vec3(0.0);
+    for (uint i = 0; i < 3; i++) {
+        Vertex corner = vertices.at[p.triangle.indices[i]];
+        vec3 normal = side * safe_normalize(axis * corner.normal, vec3(0.0));
+        float above = dot(p.position - (axis * corner.position + instance.origin), normal);
+        moved -= p.weights[i] * min(above, 0.0) * normal;
+    }
+    float far = length(moved);
+    return p.position + moved * min(1.0, MOST_CURVED / max(far, 1.0e-6));
+}
+
 // Start of a ray that leaves the surface on the side of `normal`: offset so that rounding cannot make it hit the
 // surface again (Wachter and Binder, A Fast and Robust Method for Avoiding Self-Intersection, scaled to coordinates).
 vec3 offset_ray(vec3 position, vec3 normal) {

@@ -7,7 +7,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::{Vec2, Vec3};
 use shaders::trace_types::SkyRecord;
 use shaders::types::Triangle;
-use shaders::types::constants::{NO_TEXTURE, TRIANGLE_ONE_SIDED, TRIANGLE_STATIC, TRIANGLE_WORLD};
+use shaders::types::constants::{
+    NO_TEXTURE, TRIANGLE_CURVED, TRIANGLE_ONE_SIDED, TRIANGLE_STATIC, TRIANGLE_WORLD,
+};
 use support::Aabb;
 use support::slice;
 
@@ -230,13 +232,14 @@ fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
                     Portion::Doubled(true) => TRIANGLE_ONE_SIDED,
                     _ => sides(key.1),
                 };
+                let curved = if surface.curved { TRIANGLE_CURVED } else { 0 };
                 grouped.triangles.push(Triangle {
                     indices,
                     material,
                     instance: surface.number,
                     fog: surface.fog,
                     lightmap,
-                    flags: TRIANGLE_WORLD | TRIANGLE_STATIC | sides | rank_bits(&info),
+                    flags: TRIANGLE_WORLD | TRIANGLE_STATIC | curved | sides | rank_bits(&info),
                 });
             }
         }

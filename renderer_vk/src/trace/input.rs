@@ -127,6 +127,8 @@ pub struct StaticSurface {
     pub model: u32,
     /// Number of the surface in the map.
     pub number: u32,
+    /// Triangles that approximate a curve.
+    pub curved: bool,
 }
 
 /// The map's geometry of constant shape.

@@ -97,6 +97,7 @@ fn static_scene<'a>(world: &'a World, fogs: &'a [Fog]) -> StaticScene<'a> {
                 lightmap: s.lightmap,
                 model: s.model,
                 number,
+                curved: s.kind == q3bsp::SurfaceKind::Patch,
             })
             .collect(),
         fogs,

@@ -252,18 +252,17 @@ pub fn axes(instance: &Instance) -> Mat3 {
 /// `Triangle.flags` of a mesh.
 fn triangle_flags(mesh: &DynamicMesh, instance: &Instance, kind: Kind, info: &MaterialInfo) -> u32 {
     // lightmap coordinates in the world's vertices are not part of the material
-    let world = if mesh.world_surface.is_some() {
-        c::TRIANGLE_WORLD
-    } else {
-        0
+    let world = match mesh.world_surface {
+        Some(_) => c::TRIANGLE_WORLD,
+        None => 0,
     };
-    let faces_camera = if instance.flags & c::INSTANCE_SUSPENDED != 0 {
-        c::TRIANGLE_FACES_CAMERA
-    } else {
-        0
+    let shape = match instance.flags & c::INSTANCE_SUSPENDED {
+        0 if world == 0 => c::TRIANGLE_CURVED,
+        0 => 0,
+        _ => c::TRIANGLE_FACES_CAMERA,
     };
     let paths = u32::from(mesh.paths) << TRIANGLE_PATHS_SHIFT;
-    world | faces_camera | sides(kind) | rank_bits(info) | paths
+    world | shape | sides(kind) | rank_bits(info) | paths
 }
 
 /// Source, vertices and indices of a mesh with its own structure; `None` if it is used for one frame.

@@ -9,7 +9,7 @@ use super::harness::{
     Gpu, Scene, bounced, ceiling_at, encode, floor_at, floor_points, gpu_tests, lambert, reference,
     through_byte,
 };
-use crate::settings::{LightSelection, Settings};
+use crate::settings::{DebugOutput, LightSelection, Settings};
 
 gpu_tests! {
     any: [
@@ -24,6 +24,7 @@ gpu_tests! {
     ],
     each: [
         an_umbra_is_black_and_a_penumbra_is_between,
+        facets_of_a_ball_do_not_shadow_it,
     ],
 }
 
@@ -414,4 +415,44 @@ fn points_pulse_with_their_style(gpu: &mut Gpu) {
         let difference = mean_difference(&pixels, floor_points(&scene).map(exact));
         assert!(difference < 0.01, "{time}: {difference}");
     }
+}
+
+fn facets_of_a_ball_do_not_shadow_it(gpu: &mut Gpu) {
+    // a convex body shows E cos / pi wherever its normal faces the sun, however coarse its triangles are
+    let sun = Vec3::new(0.39, 0.92, 0.1).normalize();
+    let dark_pixels = |gpu: &mut Gpu, curved: bool| {
+        let mut scene = Scene::new(Vec3::new(-100.0, 0.0, 10.0), Vec3::ZERO, 24.0, 64);
+        let white = scene.diffuse(1.0);
+        scene.ball(Vec3::ZERO, 20.0, 4, white, curved);
+        scene.sun(sun, 2.0, 1.0e-5);
+        let settings = Settings {
+            rt_antialiasing: false,
+            ..reference()
+        };
+        let (pixels, _) = gpu.render(&scene, &settings, 2);
+        let normals = Settings {
+            rt_debug: DebugOutput::Normals,
+            ..settings
+        };
+        let (_, normals) = gpu.render(&scene, &normals, 2);
+        let (mut dark, mut lit) = (0, 0);
+        for (pixel, [x, y, z, _]) in pixels.iter().zip(normals) {
+            let cosine = (Vec3::from([x, y, z].map(f32::from)) / 127.5 - 1.0).dot(sun);
+            // black outside of the ball; eight bits of the normal are too coarse for grazing light
+            if [x, y, z] == [0; 3] || cosine < 0.2 {
+                continue;
+            }
+            let part = pixel.x / (2.0 * cosine / std::f32::consts::PI);
+            match part {
+                0.96..1.04 => lit += 1,
+                0.0..0.01 => dark += 1,
+                _ => panic!("{part} of the light at a cosine of {cosine}"),
+            }
+        }
+        println!("curved: {curved}; {lit} pixels are lit, {dark} in the shadow of facets");
+        assert!(lit > 300, "{lit}");
+        dark
+    };
+    assert!(dark_pixels(gpu, false) > 20, "the facets show without it");
+    assert_eq!(dark_pixels(gpu, true), 0);
 }

@@ -183,6 +183,53 @@ impl Scene {
             lightmap: c::NO_TEXTURE,
             model: 0,
             number: self.surfaces.len() as u32,
+            curved: false,
+        });
+    }
+
+    /// A ball of the map, of `rings` bands with twice as many quads each, that is shaded as a sphere.
+    pub fn ball(&mut self, center: Vec3, radius: f32, rings: u32, material: u32, curved: bool) {
+        let first = self.vertices.len() as u32;
+        let columns = 2 * rings;
+        for ring in 0..=rings {
+            for column in 0..=columns {
+                let (down, around) = (
+                    ring as f32 / rings as f32 * std::f32::consts::PI,
+                    column as f32 / columns as f32 * std::f32::consts::TAU,
+                );
+                let normal = Vec3::new(
+                    down.sin() * around.cos(),
+                    down.sin() * around.sin(),
+                    down.cos(),
+                );
+                self.vertices.push(Vertex {
+                    position: center + radius * normal,
+                    normal,
+                    st: Vec2::ZERO,
+                    lightmap: Vec2::ZERO,
+                    color: u32::MAX,
+                });
+            }
+        }
+        let first_index = self.indices.len() as u32;
+        for ring in 0..rings {
+            for column in 0..columns {
+                let above = first + ring * (columns + 1) + column;
+                let below = above + columns + 1;
+                // clockwise from the front
+                let quad = [above, above + 1, below, below, above + 1, below + 1];
+                self.indices.extend(quad);
+            }
+        }
+        self.surfaces.push(StaticSurface {
+            first_index,
+            index_count: 12 * rings * rings,
+            material,
+            fog: 0,
+            lightmap: c::NO_TEXTURE,
+            model: 0,
+            number: self.surfaces.len() as u32,
+            curved,
         });
     }
 
