@@ -140,6 +140,8 @@ fn meshes_move_with_their_entities_and_by_their_vertices(gpu: &mut Gpu) {
             step(&mut view.def);
             for vertex in &mut view.vertices {
                 vertex.position = bend(vertex.position);
+                // of the bent plane: light is gathered on the surface that normals imply
+                vertex.normal = (vertex.normal - Vec3::Y * (0.05 * vertex.normal.x)).normalize();
             }
         }
     });
