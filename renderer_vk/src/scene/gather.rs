@@ -404,6 +404,8 @@ impl<'a> Gatherer<'a> {
         let found = slice::get(&world.surfaces, surface as usize)?;
         (found.index_count > 0).then(|| PendingDeform {
             surface,
+            first_index: found.first_index,
+            index_count: found.index_count,
             material: self.input.materials.resolve(found.material),
             sort_key: 0,
             dlights: 0,
@@ -437,8 +439,8 @@ impl<'a> Gatherer<'a> {
                     level: 0,
                     surface: deform.surface,
                 });
-                let first = surface.first_index as usize;
-                let range = first..first + surface.index_count as usize;
+                let first = deform.first_index as usize;
+                let range = first..first + deform.index_count as usize;
                 let base = count(out.vertices.len());
                 let own = world.surface_vertices(surface);
                 let classic = world.classic_vertices(surface).filter(|_| !self.traced);

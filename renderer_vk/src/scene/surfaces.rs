@@ -148,11 +148,13 @@ impl SurfaceRun<'_> {
             return None;
         }
         let (first_index, index_count) = match &surface.lod {
-            Some(lod) if !deforms => {
+            Some(lod) => {
                 let depth = self.local.forward.dot(lod.origin() - self.local.camera);
                 lod.choose(depth, self.curve_error)
             }
-            _ => {
+            // the copy has vertices of its own; `add_deformed` takes them in place of the surface's
+            None if deforms => (surface.first_index, surface.index_count),
+            None => {
                 let copy = surface.classic.map(|copy| copy.first_index);
                 (copy.unwrap_or(surface.first_index), surface.index_count)
             }
@@ -169,6 +171,8 @@ impl SurfaceRun<'_> {
         if deforms {
             return Some(PendingDeform {
                 surface: index,
+                first_index,
+                index_count,
                 material,
                 sort_key,
                 dlights,
@@ -229,6 +233,9 @@ impl SurfaceRun<'_> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PendingDeform {
     pub surface: u32,
+    /// Indices of its level of detail.
+    pub first_index: u32,
+    pub index_count: u32,
     pub material: u32,
     pub sort_key: u64,
     pub dlights: u32,

@@ -116,6 +116,20 @@ fn aside(stage: &mut Stage, board: &Board) -> Result<(), Raised> {
     stage.keep("turned", |engine| board.draw(engine, &view))
 }
 
+/// From where curves have fewer rows and columns, which are the points that a deformation moves.
+fn from_afar(stage: &mut Stage) -> Result<(), Raised> {
+    stage.start_map(super::board::MAP)?;
+    let board = kinds(Shape::Patch);
+    let mut view = board.view(stage);
+    for away in [300.0, 500.0] {
+        view.origin.x -= away;
+        stage.keep(&format!("{}", -view.origin.x), |engine| {
+            board.draw(engine, &view)
+        })?;
+    }
+    Ok(())
+}
+
 /// The scenes of this module.
 pub(super) fn scenes() -> Vec<Scene> {
     scene_list! {
@@ -123,6 +137,8 @@ pub(super) fn scenes() -> Vec<Scene> {
         "deform-squares": "On unconnected squares.", board(kinds(Shape::Squares(5)), &TIMES);
         "deform-face": "On faces.", board(kinds(Shape::Face), &TIMES);
         "deform-patch": "On patches.", board(kinds(Shape::Patch), &TIMES);
+        "deform-patch-far": "On patches with fewer columns.", calls(from_afar),
+            files: || kinds(Shape::Patch).files(), quick: true;
         "deform-model": "On models.", board(kinds(Shape::Model), &TIMES);
         "deform-sprite": "On sprites.", board(kinds(Shape::Sprite), &[337]);
         "deform-poly": "On polygons.", board(kinds(Shape::Poly), &[337]);
