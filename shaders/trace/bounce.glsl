@@ -87,7 +87,7 @@ bool bounce_shade(Hit hit, vec3 origin, inout vec3 throughput, inout vec3 sum, o
     if (!in_lists) sum += throughput * max(layer.emission, 0.0);
     throughput *= clamp(layer.lit, 0.0, 1.0);
     v.face_normal = dot(p.face_normal, direction) > 0.0 ? -p.face_normal : p.face_normal;
-    v.position = curved_position(p, v.face_normal);
+    v.position = shading_position(p, v.face_normal);
     v.normal = dot(p.normal, v.face_normal) < 0.0 ? -p.normal : p.normal;
     return max_component(throughput) > 0.0;
 }

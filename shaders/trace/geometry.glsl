@@ -84,13 +84,14 @@ bool is_culled(SurfacePoint p, vec3 direction) {
     return from_front == ((material_flags & MATERIAL_CULL_BACK) != 0);
 }
 
-// Farthest that `curved_position` moves a point, units: less than the thickness of walls.
-const float MOST_CURVED = 4.0;
+// Largest offset of `shading_position`, units. Bounds the error where a mesh has the normals of a curve but is not one, as
+// a box with smooth normals.
+const float MAX_SHADING_OFFSET = 4.0;
 
-// The point of the curved surface that a triangle approximates, on the side of `face`. Light gathered there is not
-// shadowed by the facets of the same surface, which would show along the terminator (Hanika, Hacking the Shadow
-// Terminator, Ray Tracing Gems II, chapter 4). Where the surface is concave on that side, the point stays.
-vec3 curved_position(SurfacePoint p, vec3 face) {
+// The point from which a surface gathers light: on curves and models offset to the surface that the vertex normals imply,
+// so that facets cast no shadow on their own surface along the terminator (Hanika, Hacking the Shadow Terminator, Ray
+// Tracing Gems II, chapter 4). `face`: the side. Where the surface is concave on that side, the offset is 0.
+vec3 shading_position(SurfacePoint p, vec3 face) {
     if ((p.triangle.flags & TRIANGLE_CURVED) == 0) return p.position;
     TraceVertices vertices = TraceVertices(p.vertices);
     Instance instance = instance_of(p.instance);
@@ -103,8 +104,8 @@ vec3 curved_position(SurfacePoint p, vec3 face) {
         float above = dot(p.position - (axis * corner.position + instance.origin), normal);
         moved -= p.weights[i] * min(above, 0.0) * normal;
     }
-    float far = length(moved);
-    return p.position + moved * min(1.0, MOST_CURVED / max(far, 1.0e-6));
+    float offset = length(moved);
+    return p.position + moved * min(1.0, MAX_SHADING_OFFSET / max(offset, 1.0e-6));
 }
 
 // Start of a ray that leaves the surface on the side of `normal`: offset so that rounding cannot make it hit the

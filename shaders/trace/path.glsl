@@ -93,7 +93,7 @@ void keep_lit(SurfacePoint p, vec3 lit, Path path, LastPlace last, float t) {
     kept.view_distance = path.travelled + t;
     bool turned = dot(p.face_normal, path.direction) > 0.0;
     kept.face_normal = turned ? -p.face_normal : p.face_normal;
-    kept.position = curved_position(p, kept.face_normal);
+    kept.position = shading_position(p, kept.face_normal);
     // the side that the path hits is lit
     kept.normal = dot(p.normal, kept.face_normal) < 0.0 ? -p.normal : p.normal;
     kept.albedo = lit;

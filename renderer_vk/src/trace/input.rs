@@ -127,7 +127,7 @@ pub struct StaticSurface {
     pub model: u32,
     /// Number of the surface in the map.
     pub number: u32,
-    /// Triangles that approximate a curve.
+    /// Its triangles approximate a curve.
     pub curved: bool,
 }
 

@@ -167,5 +167,5 @@ pub const TRIANGLE_FACES_CAMERA: u32 = 2;
 pub const TRIANGLE_ONE_SIDED: u32 = 4;
 /// The triangle is static: its geometry names its instance, and `instance` is the index of its surface.
 pub const TRIANGLE_STATIC: u32 = 8;
-/// The triangle is part of a curve or a model: light is gathered on the curved surface that it approximates.
+/// The triangle is part of a curve or a model: its vertex normals imply a curved surface.
 pub const TRIANGLE_CURVED: u32 = 16;

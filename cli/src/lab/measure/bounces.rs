@@ -1,4 +1,4 @@
-//! Light that paths of few bounces leave out.
+//! Light that paths of few bounces lack.
 
 use anyhow::Result;
 use indicatif::ProgressBar;
@@ -14,8 +14,14 @@ const FEW: [u32; 4] = [0, 1, 2, 4];
 /// Bounces of the reference.
 const ALL: u32 = 8;
 
-/// Excess over the reference, as a part of its mean luminance, above which a pixel counts as too bright.
-const EXCESS: f32 = 0.05;
+/// Excess over the reference above which a pixel counts as too bright.
+const EXCESS: f64 = 0.05;
+
+/// Added to the luminance by which an error is divided, as a part of the median: bounds the weight of black pixels.
+const FLOOR: f64 = 0.01;
+
+/// Part of the pixels that [`Missing::darkest`] leaves out.
+const DARKEST: f64 = 0.1;
 
 /// Frames of a place.
 pub fn frames(reference: u32) -> u64 {
@@ -49,6 +55,7 @@ pub fn place(
         let figures = json!({
             "relative_rmse": figures.relative_rmse,
             "mean": figures.mean,
+            "darkest": figures.darkest,
             "too_bright": figures.too_bright,
         });
         results.insert(bounces.to_string(), figures);
@@ -56,37 +63,58 @@ pub fn place(
     Ok(results)
 }
 
-/// What a picture lacks of its reference.
+/// Luminance of a picture against its reference.
 #[derive(Debug, PartialEq)]
 struct Missing {
-    /// Root of the mean squared difference of luminance over the mean luminance of the reference.
+    /// Root of the mean squared relative error of a pixel.
     relative_rmse: f64,
-    /// Mean luminance over that of the reference.
+    /// Sum over that of the reference: lamps and sky weigh most.
     mean: f64,
-    /// Part of the pixels that are brighter than the reference by more than [`EXCESS`]: with noise alone, none.
+    /// Luminance over that of the reference which all but [`DARKEST`] of the pixels exceed.
+    darkest: f64,
+    /// Part of the pixels that are brighter than the reference by more than [`EXCESS`].
     too_bright: f64,
 }
 
 impl Missing {
     fn of(light: &[f32], all: &[f32]) -> Self {
-        let count = all.len().max(1) as f64;
-        let mean = |values: &[f32]| values.iter().copied().map(f64::from).sum::<f64>() / count;
-        let whole = mean(all).max(f64::MIN_POSITIVE);
-        let pairs = || light.iter().zip(all).map(|(few, all)| f64::from(few - all));
-        let squares = pairs().map(|d| d * d).sum::<f64>() / count;
-        let limit = f64::from(EXCESS) * whole;
+        let quantile = |values: &mut [f64], part: f64| {
+            values.sort_by(f64::total_cmp);
+            let at = (values.len() as f64 * part) as usize;
+            values.get(at).copied().unwrap_or(0.0)
+        };
+        let mut sorted: Vec<f64> = all.iter().copied().map(f64::from).collect();
+        let floor = (FLOOR * quantile(&mut sorted, 0.5)).max(f64::MIN_POSITIVE);
+        let pairs = || {
+            light
+                .iter()
+                .zip(all)
+                .map(|(a, b)| (f64::from(*a), f64::from(*b)))
+        };
+        let mut ratios: Vec<f64> = pairs()
+            .map(|(few, all)| (few + floor) / (all + floor))
+            .collect();
+        let count = ratios.len().max(1) as f64;
+        let squares = ratios
+            .iter()
+            .map(|ratio| (ratio - 1.0).powi(2))
+            .sum::<f64>();
+        let bright = ratios.iter().filter(|ratio| **ratio > 1.0 + EXCESS).count();
+        let (few, whole) = pairs().fold((0.0, 0.0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
         Self {
-            relative_rmse: squares.sqrt() / whole,
-            mean: mean(light) / whole,
-            too_bright: pairs().filter(|d| *d > limit).count() as f64 / count,
+            relative_rmse: (squares / count).sqrt(),
+            mean: (few + floor) / (whole + floor),
+            darkest: quantile(&mut ratios, DARKEST),
+            too_bright: bright as f64 / count,
         }
     }
 }
 
 /// Columns: heading, name in the JSON.
-const COLUMNS: [(&str, &str); 3] = [
+const COLUMNS: [(&str, &str); 4] = [
     ("relative RMSE", "relative_rmse"),
     ("mean", "mean"),
+    ("darkest tenth", "darkest"),
     ("too bright", "too_bright"),
 ];
 
@@ -112,21 +140,39 @@ pub fn print(all: &Map<String, Value>) {
 mod tests {
     use super::*;
 
+    fn near(a: f64, b: f64) -> bool {
+        (a - b).abs() < 0.02
+    }
+
     #[test]
     fn half_the_light_is_half_missing() {
-        let missing = Missing::of(&[1.0, 1.0], &[2.0, 2.0]);
-        let half = Missing {
-            relative_rmse: 0.5,
-            mean: 0.5,
-            too_bright: 0.0,
-        };
-        assert_eq!(missing, half);
+        let Missing {
+            relative_rmse,
+            mean,
+            darkest,
+            too_bright,
+        } = Missing::of(&[1.0, 4.0], &[2.0, 8.0]);
+        assert!(
+            [relative_rmse, mean, darkest]
+                .into_iter()
+                .all(|v| near(v, 0.5))
+        );
+        assert_eq!(too_bright, 0.0);
+    }
+
+    #[test]
+    fn a_lamp_hides_a_dark_corner_in_the_mean_alone() {
+        let lit = [[1.0f32; 8].as_slice(), &[1000.0]].concat();
+        let dark = [[0.5f32, 0.5].as_slice(), &[1.0; 6], &[1000.0]].concat();
+        let missing = Missing::of(&dark, &lit);
+        assert!(near(missing.mean, 1.0) && near(missing.darkest, 0.5));
+        assert!(near(missing.relative_rmse, 0.5 * (2.0f64 / 9.0).sqrt()));
     }
 
     #[test]
     fn a_leak_is_counted() {
         let missing = Missing::of(&[1.0, 0.2, 1.0, 1.0], &[1.0, 0.0, 1.0, 2.0]);
         assert_eq!(missing.too_bright, 0.25);
-        assert_eq!(Missing::of(&[], &[]).mean, 0.0);
+        assert_eq!(Missing::of(&[], &[]).mean, 1.0);
     }
 }
