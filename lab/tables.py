@@ -54,7 +54,8 @@ TABLES = [
      "samples; none [SSIM, FLIP]; TAA; A-SVGF; A-SVGF, TAA; sparse; sparse, TAA", H100, "2026-11-27",
      "relight-lab measure oa_dm1 --reference 1024 --views 1 --matrix"),
     ("quality-bounces", "traced-look", "| bounces | relative RMSE",
-     "bounces; relative RMSE, mean; relative RMSE, most; luminance over that of 8 bounces, mean; least; pixels brighter by 5 %",
+     "bounces; relative RMSE, mean; relative RMSE, most; luminance over that of 8 bounces, mean; least; "
+     "ratio of the darkest tenth, mean; its least; pixels brighter by 5 %",
      H100, "2026-11-27", "relight-lab measure MAP --bounce-counts --reference 1024 --views 2 --size 640x480"),
     ("quality-mirrors", "traced-look", "| place | part |",
      "place; part; A-SVGF moving [SSIM, FLIP]; A-SVGF at rest [SSIM, FLIP]; TAA moving [SSIM, FLIP]; "
