@@ -20,7 +20,7 @@ pub use lights::{
     TriangleLight,
 };
 pub use structures::{BvhInstance, BvhNode, BvhTriangle, FilterStep, GeometryRecord, PassStep};
-pub use surroundings::{FlareView, FogView, PortalRecord, SkyRecord, TransportView};
+pub use surroundings::{FlareView, FogView, MirrorPlane, PortalRecord, SkyRecord, TransportView};
 pub use view::{CameraView, ExposureView, ImageView, PostView, SceneView, TargetView};
 
 /// Parameters of one traced view: the traced size, and a block for each concern. Blocks with addresses come first,

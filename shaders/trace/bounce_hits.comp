@@ -14,18 +14,23 @@ void main() {
     PathVertex v = first_vertex(task);
     float random = 0.5;
     vec3 throughput;
-    Hit hit = bounce_hit_read(cell, throughput);
+    uint chain;
+    Hit hit = bounce_hit_read(cell, throughput, chain);
     bool onward = false;
     if (gathers(task)) {
         random = bounce_random(task, push.number, BOUNCE_HITS);
-        vec3 origin = push.number == 0 ? offset_ray(v.position, v.face_normal) : bounce_origin_read(cell, b.found);
-        onward = hit.geometry != NO_HIT && bounce_shade(hit, origin, throughput, b.found, v);
+        vec3 origin = vertex_origin(v);
+        if (push.number > 0) origin = bounce_origin_read(cell, b.found);
+        else if (VIEW.transport.mirror_count > 0) bounce_origin_read(cell, b.found);
+        onward = hit.geometry != NO_HIT && bounce_shade(hit, origin, chain, throughput, b.found, v);
         if (onward) {
-            b.light = vertex_light(v);
-            b.light.light *= throughput;
-            b.origin = offset_ray(v.position, v.face_normal);
+            if (v.chain == CHAIN_NONE) {
+                b.light = vertex_light(v);
+                b.light.light *= throughput;
+            }
+            b.origin = vertex_origin(v);
         }
     }
     bounce_light_write(cell, b, random);
-    if (!is_last_bounce()) bounce_vertex_write(cell, v, onward ? throughput : vec3(0.0));
+    if (LAST_BOUNCE == 0) bounce_vertex_write(cell, v, onward ? throughput : vec3(0.0));
 }

@@ -27,39 +27,45 @@ uint bounce_place(ivec2 cell, uint part) {
 // Whether paths have a throughput other than 1 before the surface that a ray meets.
 bool has_throughput() { return VIEW.transport.filter_count != 0 || VIEW.transport.bounces > 1; }
 
-// Writes the hit of a bounce ray, and the throughput of the path before the hit surface.
-void bounce_hit_write(ivec2 cell, Hit hit, vec3 throughput) {
+// Writes the hit of a bounce ray, and the throughput of the path before the hit surface. `chain`: how the ray started.
+void bounce_hit_write(ivec2 cell, Hit hit, vec3 throughput, uint chain) {
     BounceTexels texels = BounceTexels(VIEW.scratch);
     texels.at[bounce_place(cell, 0)] = uvec4(hit.geometry, hit.primitive, floatBitsToUint(hit.barycentrics));
-    if (has_throughput()) texels.at[bounce_place(cell, 1)] = uvec4(floatBitsToUint(throughput), 0);
+    if (has_throughput()) texels.at[bounce_place(cell, 1)] = uvec4(floatBitsToUint(throughput), chain);
 }
 
 // The distance is not stored; it follows from the point on the triangle.
-Hit bounce_hit_read(ivec2 cell, out vec3 throughput) {
+Hit bounce_hit_read(ivec2 cell, out vec3 throughput, out uint chain) {
     BounceTexels texels = BounceTexels(VIEW.scratch);
     uvec4 hit = texels.at[bounce_place(cell, 0)];
     throughput = vec3(1.0);
-    if (has_throughput()) throughput = uintBitsToFloat(texels.at[bounce_place(cell, 1)].xyz);
+    chain = CHAIN_NONE;
+    if (has_throughput()) {
+        uvec4 path = texels.at[bounce_place(cell, 1)];
+        throughput = uintBitsToFloat(path.xyz);
+        chain = path.w;
+    }
     return Hit(hit.x, hit.y, uintBitsToFloat(hit.zw), 0.0);
 }
 
-// Writes the normals of the vertex from which the next bounce starts, in place of the hit; its position is the origin of
+// Writes the directions of the vertex from which the next bounce starts, in place of the hit; its position is the origin of
 // the shadow ray. `throughput`: 0 if the path has ended.
 void bounce_vertex_write(ivec2 cell, PathVertex v, vec3 throughput) {
     BounceTexels texels = BounceTexels(VIEW.scratch);
-    texels.at[bounce_place(cell, 0)] = uvec4(pack_normal(v.face_normal), pack_normal(v.normal), 0, 0);
-    texels.at[bounce_place(cell, 1)] = uvec4(floatBitsToUint(throughput), 0);
+    uvec2 direction = v.chain == CHAIN_NONE ? uvec2(0) : pack_direction(v.direction, uvec2(0));
+    texels.at[bounce_place(cell, 0)] = uvec4(pack_normal(v.face_normal), pack_normal(v.normal), direction);
+    texels.at[bounce_place(cell, 1)] = uvec4(floatBitsToUint(throughput), v.chain);
 }
 
 // The vertex, without its position.
 PathVertex bounce_vertex_read(ivec2 cell, out vec3 throughput) {
     BounceTexels texels = BounceTexels(VIEW.scratch);
-    uvec2 normals = texels.at[bounce_place(cell, 0)].xy;
-    throughput = uintBitsToFloat(texels.at[bounce_place(cell, 1)].xyz);
-    return PathVertex(vec3(0.0), unpack_normal(normals.x), unpack_normal(normals.y));
+    uvec4 directions = texels.at[bounce_place(cell, 0)], path = texels.at[bounce_place(cell, 1)];
+    throughput = uintBitsToFloat(path.xyz);
+    return PathVertex(vec3(0.0), unpack_normal(directions.x), unpack_normal(directions.y), path.w, unpack_direction(directions.zw));
 }
 
-// A shadow ray to a light, and the radiance found before it.
+// A shadow ray to a light, which starts where the next bounce does, and the radiance found before it.
 struct BounceLight {
     vec3 origin;
     LightSample light;

@@ -208,8 +208,8 @@ vec4 environment_mean(Stage stage, SurfacePoint p) {
     return textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[nonuniformEXT(stage.sampler_index)]), vec2(0.5), 32.0);
 }
 
-// Treatment of reflections: a ray follows them; where paths end, environment images replace them; diffuse bounces
-// ignore them.
+// Treatment of reflections: a ray follows them; where paths end, environment images replace them; on paths of bounced
+// light, a ray may follow them, and coordinates that depend on the camera are replaced by the image's mean.
 const uint SEEN_FOLLOWED = 0, SEEN_LAST = 1, SEEN_BOUNCED = 2;
 
 // Evaluates the stages of a material over the background, in displayed values.
@@ -257,7 +257,7 @@ Layer run_stages(Material material, SurfacePoint p, Footprint footprint, uint se
             vec3 image = texel.rgb;
             alpha = texel.a * (stage.rgb_gen == RGBGEN_LIGHTING_DIFFUSE && stage.alpha_gen == ALPHAGEN_IDENTITY ? 1.0 : color.a);
             // the reflection brings its own light
-            if (mirrors && seen == SEEN_FOLLOWED) source.reflected = mean.rgb * (is_lit ? vec3(1.0) : color.rgb);
+            if (mirrors && seen != SEEN_LAST) source.reflected = mean.rgb * (is_lit ? vec3(1.0) : color.rgb);
             if (haze) {
                 source.haze = is_lit ? image : image * color.rgb;
                 lights_haze = is_lit;
@@ -292,7 +292,7 @@ vec3 bounded_albedo(Material material, vec3 lit) {
     return material.lit_scale != 1.0 ? min(lit * material.lit_scale, max(lit, 1.0)) : lit;
 }
 
-// Parts of the point's stages for a diffuse bounce, each by itself in linear light.
+// Parts of the point's stages on a path of bounced light, each by itself in linear light.
 Layer evaluate_stages(SurfacePoint p, Footprint footprint) {
     Material material = material_of(p.triangle.material);
     Layer shown = run_stages(material, p, footprint, SEEN_BOUNCED);

@@ -55,11 +55,8 @@ uint normal_bin_of(vec3 normal) {
     return axis * 2 + (normal[axis] < 0.0 ? 1 : 0);
 }
 
-LightSet lights_at(vec3 position, vec3 face_normal, vec3 normal) {
-    // a surface point lies on the boundary of leaves: step to the side that the surface faces
-    uint cell = cell_at(position + face_normal);
-    // the row after those of the cells is for points in none
-    uint place = cell * NORMAL_BINS + (cell < VIEW.lights.cell_count ? normal_bin_of(normal) : 0);
+// The lights of a row of the lists.
+LightSet lights_of(uint place) {
     LightRow row = LightRows(VIEW.lights.rows).at[place];
     uint suns = (row.flags & LIGHT_ROW_SUNS) != 0 ? VIEW.lights.sun_count : 0;
     LightSet set = LightSet(row.first, row.count, row.parent, (row.flags & LIGHT_ROW_SWEPT) != 0, suns, 0, 0);
@@ -71,6 +68,16 @@ LightSet lights_at(vec3 position, vec3 face_normal, vec3 normal) {
     }
     return set;
 }
+
+LightSet lights_at(vec3 position, vec3 face_normal, vec3 normal) {
+    // a surface point lies on the boundary of leaves: step to the side that the surface faces
+    uint cell = cell_at(position + face_normal);
+    // the row after those of the cells is for points in none
+    return lights_of(cell * NORMAL_BINS + (cell < VIEW.lights.cell_count ? normal_bin_of(normal) : 0));
+}
+
+// All lights of the map and of the frame.
+LightSet all_lights() { return lights_of(VIEW.lights.cell_count * NORMAL_BINS); }
 
 // The same lights with all listed ones in one row: the parent's, which also has some that do not reach the point.
 LightSet whole_set(LightSet set) {
@@ -481,9 +488,8 @@ LightChoice sample_one(LightSet set, vec3 position, vec3 normal, inout float u) 
     return LightChoice(listed.light, listed.weight / (1.0 - chance), listed.total);
 }
 
-// Selects one light, and a point on it, for a surface point with the geometric normal `face_normal`.
-LightSample one_light(vec3 position, vec3 face_normal, vec3 normal) {
-    LightSet set = lights_at(position, face_normal, normal);
+// Selects one light of a set, and a point on it, for a surface point.
+LightSample one_light(LightSet set, vec3 position, vec3 normal) {
     if (set_count(set) == 0) return no_light();
     vec2 u = rng_next2();
     LightChoice choice;

@@ -3,6 +3,7 @@
 #define RELIGHT_TRACE_REFLECT_REFRACT_GLSL
 #include "trace/path.glsl"
 #include "trace/dielectric.glsl"
+#include "trace/portal.glsl"
 
 // `PATHS_*` number of paths that pass a portal after `paths`; `scene/turned.rs` numbers them the same way.
 uint paths_through(uint paths, uint portal) {
@@ -14,32 +15,9 @@ uint paths_through(uint paths, uint portal) {
     return PATHS_PORTAL + count + last * count + portal;
 }
 
-// The portal that the surface belongs to, or `portal_count`.
-uint portal_at(SurfacePoint p) {
-    for (uint i = 0; i < VIEW.scene.portal_count; i++) {
-        vec4 plane = Portals(VIEW.scene.portals).at[i].plane;
-        if (abs(dot(plane.xyz, p.position) - plane.w) < 1.0 && abs(dot(plane.xyz, p.face_normal)) > 0.99) return i;
-    }
-    return VIEW.scene.portal_count;
-}
-
 // Continues the path through a portal: mirrored, or from the far camera.
 void pass_portal(inout Path path, SurfacePoint p, float t, uint index) {
-    PortalRecord portal = Portals(VIEW.scene.portals).at[index];
-    if (portal.mirror != 0) {
-        vec3 n = portal.plane.xyz;
-        path.direction = normalize(path.direction - n * (2.0 * dot(n, path.direction)));
-        path.origin = offset_ray(p.position, dot(n, path.direction) < 0.0 ? -n : n);
-    } else {
-        vec3 local = p.position - portal.surface_origin;
-        vec3 origin = portal.camera_origin, direction = vec3(0.0);
-        for (int i = 0; i < 3; i++) {
-            origin += portal.camera_axis[i] * dot(local, portal.surface_axis[i]);
-            direction += portal.camera_axis[i] * dot(path.direction, portal.surface_axis[i]);
-        }
-        path.direction = normalize(direction);
-        path.origin = origin;
-    }
+    through_portal(Portals(VIEW.scene.portals).at[index], p.position, path.direction, path.origin);
     lit_plane = vec4(0.0);
     path.last = last_through(path.last, index);
     path.travelled += t;

@@ -47,6 +47,15 @@ const LEAST_TRANSMISSION: f32 = 0.15;
 /// Minimum of a liquid's colour channels at [`LIQUID_DEPTH`].
 const LEAST_COLOR: f32 = 0.05;
 
+/// The `MATERIAL_*` bit of a dielectric that mirrors light.
+pub fn mirrors(dielectric: &types::Dielectric) -> u32 {
+    if dielectric.index > 0.0 {
+        c::MATERIAL_REFLECTS
+    } else {
+        0
+    }
+}
+
 /// Transmission of a material for rays. No directive defines a liquid's absorption: it is derived from the mean colour
 /// of the stages over white, in white light, normalised to a brightest channel of 1. If the map has a fog volume of
 /// this material, the fog absorbs instead ([`Materials::leave_to_fog`](super::Materials::leave_to_fog)).

@@ -97,5 +97,8 @@ pub fn material_flags(shader: &Shader, class: LightmapClass) -> u32 {
     if has_vertex_light(class) {
         flags |= c::MATERIAL_VERTEX_LIGHT;
     }
+    if (shader.stages.iter()).any(|stage| light::is_reflection(shader, stage)) {
+        flags |= c::MATERIAL_REFLECTS;
+    }
     flags
 }

@@ -356,7 +356,7 @@ impl Materials {
             defaulted,
             sort,
             order,
-            flags: flags::material_flags(&shader, class),
+            flags: flags::material_flags(&shader, class) | dielectric::mirrors(&dielectric),
             dielectric,
             cull: shader.cull,
             polygon_offset: shader.polygon_offset,

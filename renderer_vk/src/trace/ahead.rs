@@ -9,8 +9,9 @@ use crate::settings::{DenoiserChoice, Settings};
 
 /// Passes that the settings decide about, or that every frame runs, the slowest to compile first. Others are
 /// compiled when a frame first runs them.
-const AHEAD: [Pass; 28] = [
+const AHEAD: [Pass; 30] = [
     Pass::Primary,
+    Pass::BounceShadeLast,
     Pass::BounceShade,
     Pass::Temporal,
     Pass::PrimarySimple,
@@ -19,6 +20,7 @@ const AHEAD: [Pass; 28] = [
     Pass::Suns,
     Pass::BounceLight,
     Pass::BounceRays,
+    Pass::MirrorLight,
     Pass::PrimaryRays,
     Pass::SampleLights,
     Pass::WaveletFirst,
@@ -47,7 +49,10 @@ fn is_chosen(pass: Pass, settings: &Settings) -> bool {
     match pass {
         Pass::SampleLights | Pass::SampledDirect | Pass::Suns => samples_one_light(settings),
         Pass::Direct => !samples_one_light(settings),
-        Pass::BounceRays | Pass::BounceShade | Pass::BounceLight => settings.rt_bounces > 0,
+        Pass::BounceShade => settings.rt_bounces > 1,
+        Pass::MirrorLight | Pass::BounceRays | Pass::BounceShadeLast | Pass::BounceLight => {
+            settings.rt_bounces > 0
+        }
         Pass::BounceUpsample => indirect::is_subsampled(settings),
         Pass::Temporal
         | Pass::WaveletFirst
@@ -103,8 +108,8 @@ mod tests {
 
     #[test]
     fn presets_have_the_passes_of_their_bounces_and_filters() {
-        use Pass::{Antialias, BounceShade, Direct, SparseFilter, Temporal};
-        let passes = [BounceShade, Temporal, SparseFilter, Antialias, Direct];
+        use Pass::{Antialias, BounceShadeLast, Direct, SparseFilter, Temporal};
+        let passes = [BounceShadeLast, Temporal, SparseFilter, Antialias, Direct];
         let low = of_preset("low", passes);
         assert_eq!(low, [false, true, false, true, false]);
         let high = of_preset("high", passes);

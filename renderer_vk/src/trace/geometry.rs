@@ -20,6 +20,7 @@ use super::doubled::doubled;
 use super::input::{Kind, MaterialInfo, MaterialTable, StaticScene, StaticSurface};
 use super::layer_boxes::{StaticLayer, bounds_of};
 use super::lifted::lifted;
+use super::mirrors::Mirrors;
 use super::surroundings::Surroundings;
 use super::tracer::Tracer;
 use crate::gpu::{Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error};
@@ -81,6 +82,8 @@ pub struct StaticGeometry {
     pub layers: Vec<StaticLayer>,
     /// Its skies, and the geometry that may be visible through them.
     pub map_skies: MapSkies,
+    /// Its flat mirrors.
+    pub mirrors: Mirrors,
     /// Surfaces that filter light, and liquids; empty unless the caller sets them.
     pub surroundings: Surroundings,
     /// Records of the structures' triangles, which shaders read by address.
@@ -313,6 +316,7 @@ impl StaticGeometry {
                 .collect(),
             layers: layers(scene, materials),
             map_skies: MapSkies::new(scene, materials),
+            mirrors: Mirrors::new(device, scene, materials)?,
             surroundings: Surroundings::default(),
             triangle_records: triangles,
         })

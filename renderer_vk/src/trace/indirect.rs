@@ -1,5 +1,7 @@
 //! Bounced light: which passes gather it.
 
+use shaders::trace_types::TransportView;
+
 use super::denoise;
 use super::frame_passes::FramePasses;
 use super::passes::Pass;
@@ -17,12 +19,20 @@ pub fn is_subsampled(settings: &Settings) -> bool {
 ///
 /// # Errors
 /// Out of memory, or the driver refuses a pipeline.
-pub fn record(passes: &mut FramePasses<'_>, bounces: u32) -> Result<(), Error> {
+pub fn record(passes: &mut FramePasses<'_>, transport: &TransportView) -> Result<(), Error> {
     let parts = if passes.facts.subsampled { 1 } else { 4 };
     for part in 0..parts {
-        for bounce in 0..bounces {
+        for bounce in 0..transport.bounces {
+            if transport.mirror_count > 0 {
+                passes.run_numbered(Pass::MirrorLight, bounce, part)?;
+            }
             passes.run_numbered(Pass::BounceRays, bounce, part)?;
-            passes.run_numbered(Pass::BounceShade, bounce, part)?;
+            let shade = if bounce + 1 < transport.bounces {
+                Pass::BounceShade
+            } else {
+                Pass::BounceShadeLast
+            };
+            passes.run_numbered(shade, bounce, part)?;
             passes.run_numbered(Pass::BounceLight, bounce, part)?;
         }
     }

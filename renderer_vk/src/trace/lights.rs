@@ -197,6 +197,21 @@ fn ends(source: &MapLightSource<'_>) -> Vec<f32> {
     source.triangles.iter().map(part).collect()
 }
 
+/// Radiance of each surface as a light, by the surface's index; zero for surfaces without light.
+fn emitted(lights: &[TriangleLight]) -> Vec<Vec3> {
+    let mut radiance = Vec::new();
+    for light in lights {
+        let surface = light.surface as usize;
+        if surface >= radiance.len() {
+            radiance.resize(surface + 1, Vec3::ZERO);
+        }
+        if let Some(of_surface) = radiance.get_mut(surface) {
+            *of_surface = light.radiance;
+        }
+    }
+    radiance
+}
+
 pub(super) fn triangle_light(light: &TriangleLight, end: f32, origin: Vec3) -> t::TriangleLight {
     t::TriangleLight {
         corners: light.vertices.map(|p| p - origin),
@@ -324,6 +339,7 @@ impl MapLights {
                 irradiance: sun.irradiance / PI,
             })
             .collect();
+        let emitted = emitted(source.triangles);
         let lists = source.lists;
         let length = |cluster| i32::try_from(cluster).map_or(0, |c| lists.row(c).len());
         let cells = source
@@ -354,6 +370,8 @@ impl MapLights {
                 0,
             ],
             suns: buffers.add("trace suns", &suns)?,
+            emitted: buffers.add("trace emitted", &emitted)?,
+            emitted_count: count(emitted.len()),
             nodes: buffers.add("trace nodes", &cells.nodes)?,
             leaf_cells: buffers.add("trace leafs", &cells.leaf_cells)?,
             grid: buffers.add("trace cell grid", &grid.starts)?,

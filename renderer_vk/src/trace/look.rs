@@ -20,7 +20,7 @@ use super::passes::counter_of;
 use super::surroundings::Surroundings;
 use super::tracer::Tracer;
 use super::view_tracer::{TracedMap, TracedView, ViewTracer};
-use relight::light::Occlusion;
+use relight::light::{Occlusion, Sight};
 
 use crate::assets::compile::sampler;
 use crate::assets::{Assets, Materials};
@@ -111,9 +111,11 @@ fn geometry(
     world: &World,
     fogs: &[Fog],
     assets: &Assets,
+    sight: &Sight,
 ) -> Result<StaticGeometry, Error> {
     let mut geometry = StaticGeometry::new(device, tracer, &static_scene(world, fogs), assets)?;
     geometry.surroundings = Surroundings::new(device, world, assets)?;
+    geometry.mirrors.find_reach(device, sight)?;
     Ok(geometry)
 }
 
@@ -188,7 +190,7 @@ impl TraceLook {
             let fogs = fog_light::lit(&world.data.fogs, source);
             Ok((fogs, MapLights::new(device, source)?))
         })?;
-        let geometry = geometry(device, tracer, world, &fogs, assets)?;
+        let geometry = geometry(device, tracer, world, &fogs, assets, &lights.sight)?;
         lights.white = exposure.scale.recip();
         lights.find_fogs(&geometry.fog_boxes);
         Ok(Self {
@@ -246,7 +248,14 @@ impl TraceLook {
         let remapping = remapping(&assets.materials);
         if remapping != self.remapping {
             // triangles store their materials; a game remaps when a flag or a button changes its look
-            self.geometry = geometry(rec.device(), self.tracer(), world, &self.fogs, assets)?;
+            self.geometry = geometry(
+                rec.device(),
+                self.tracer(),
+                world,
+                &self.fogs,
+                assets,
+                &self.lights.sight,
+            )?;
             self.remapping = remapping;
         }
         let map = TracedMap {

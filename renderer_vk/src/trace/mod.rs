@@ -36,6 +36,7 @@ pub mod light_tables;
 pub mod light_weights;
 pub mod lights;
 pub mod look;
+mod mirrors;
 pub mod motion;
 mod nearby;
 mod part_mesh;

@@ -276,6 +276,13 @@ passes! {
         writes: &[DirectLight],
         counter: Some(t::COUNT_DIRECT),
     }
+    /// Light that flat mirrors of the map throw on the surfaces from which a bounce starts.
+    MirrorLight = "trace_mirror_light", Rays(&shaders::TRACE_MIRROR_LIGHT), Cells {
+        reads: &[Scene, Lights, GBuffer, Positions, Normals],
+        may_read: &[GradientPixels, BounceLights],
+        writes: &[BounceLights],
+        counter: Some(t::COUNT_MIRRORS),
+    }
     /// Rays of a bounce.
     BounceRays = "trace_bounce_rays", Rays(&shaders::TRACE_BOUNCE_RAYS), Cells {
         reads: &[Scene, GBuffer, Positions, Normals],
@@ -287,7 +294,15 @@ passes! {
     BounceShade = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
         switch: Some((ids::bounce::HAS_FOG, MapFog)),
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
-        may_read: &[GradientPixels],
+        may_read: &[GradientPixels, BounceLights],
+        writes: &[BounceLights],
+    }
+    /// The same of the last bounce, after which no path goes on.
+    BounceShadeLast = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
+        constants: &[(ids::bounce::LAST_BOUNCE, 1)],
+        switch: Some((ids::bounce::HAS_FOG, MapFog)),
+        reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
+        may_read: &[GradientPixels, BounceLights],
         writes: &[BounceLights],
     }
     /// Shadow rays to those lights.
@@ -432,7 +447,7 @@ impl Pass {
 }
 
 /// Number of ray counters.
-pub const COUNTERS: usize = t::COUNT_SUNS as usize + 1;
+pub const COUNTERS: usize = t::COUNT_MIRRORS as usize + 1;
 
 /// Number of the ray counter of the pass with this name.
 pub fn counter_of(name: &str) -> Option<usize> {

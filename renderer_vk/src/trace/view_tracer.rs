@@ -325,7 +325,7 @@ impl ViewTracer {
         self.denoiser.reproject_gradients(passes)?;
         light_directly(passes, settings, params)?;
         if facts.bounces {
-            indirect::record(passes, params.transport.bounces)?;
+            indirect::record(passes, &params.transport)?;
         } else {
             clear_indirect(targets, passes)?;
         }

@@ -9,6 +9,14 @@ pub const KIND_TRANSLUCENT: u32 = 2;
 pub const KIND_SKY: u32 = 3;
 pub const KIND_PASSED: u32 = 4;
 
+/// `TransportView::mirror_of_surface`: the surface is no flat mirror, or is in no list.
+pub const NO_MIRROR: u32 = 0xFFFF_FFFF;
+
+/// Bits of `MirrorPlane::flags`: some of its mirrors reflect on both sides.
+pub const MIRROR_TWO_SIDED: u32 = 1;
+/// They are glass or surfaces of liquids.
+pub const MIRROR_TRANSLUCENT: u32 = 2;
+
 /// Levels of bloom, each of half the size of the one before.
 pub const BLOOM_LEVELS: u32 = 5;
 
@@ -82,6 +90,7 @@ pub const COUNT_DIRECT: u32 = 2;
 pub const COUNT_BOUNCE_RAYS: u32 = 3;
 pub const COUNT_BOUNCE_LIGHT: u32 = 4;
 pub const COUNT_SUNS: u32 = 5;
+pub const COUNT_MIRRORS: u32 = 6;
 
 /// Counters of each counted pass, to reduce contention.
 pub const COUNTER_ROWS: u32 = 64;
@@ -171,6 +180,8 @@ pub const STREAM_SUN: u32 = 4;
 pub const STREAM_SUN_PASS: u32 = 5;
 /// Number of streams: distance between those of the passes of bounces.
 pub const STREAMS: u32 = 6;
+/// Light across mirrors of the first bounce: after the streams of three passes of 16 bounces.
+pub const STREAM_MIRRORS: u32 = 290;
 
 /// Streams of the denoiser's random numbers (`dither` in `denoise.glsl`): rounding of the fresh light; with
 /// `rt_denoiser 2` of the number of frames.

@@ -152,6 +152,8 @@ pub struct LightView {
     pub nodes: u64,
     /// Cell of each leaf (`i32`).
     pub leaf_cells: u64,
+    /// Radiance of each surface of the map as a light (`Vec3`); zero for those in no list.
+    pub emitted: u64,
     /// Start of the BSP walk for each box of a grid over the map (`i32`: a node, or `-1 - leaf`).
     pub grid: u64,
     /// Number of nodes; 0: every point lies in no cluster.
@@ -180,6 +182,6 @@ pub struct LightView {
     pub grid_size: [u32; 3],
     /// Ambient light, as radiance of a white diffuse surface.
     pub ambient: Vec3,
-    /// To a multiple of eight bytes.
-    pub padding: u32,
+    /// Number of surfaces in `emitted`.
+    pub emitted_count: u32,
 }

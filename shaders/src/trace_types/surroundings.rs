@@ -31,6 +31,24 @@ pub struct PortalRecord {
     pub camera_axis: [Vec3; 3],
 }
 
+/// The flat mirrors of the map in one plane.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct MirrorPlane {
+    /// `xyz . p = w`; `xyz`: unit vector on the front side.
+    pub plane: [f32; 4],
+    /// Centre of the sphere around the mirrors.
+    pub centre: Vec3,
+    /// Its radius.
+    pub radius: f32,
+    /// Area of the mirrors, square units.
+    pub area: f32,
+    /// Sum of the probabilities of this plane and those before it.
+    pub until: f32,
+    /// `MIRROR_*` bits.
+    pub flags: u32,
+}
+
 /// Bounds of surfaces that only some rays test, and limits of paths.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -43,6 +61,12 @@ pub struct TransportView {
     pub beyond: u64,
     /// One bit for each surface of the world: it may be visible through a sky.
     pub beyond_surfaces: u64,
+    /// [`MirrorPlane`]s, largest area first.
+    pub mirrors: u64,
+    /// For each surface of the map, the index of its [`MirrorPlane`], or `NO_MIRROR`.
+    pub mirror_of_surface: u64,
+    /// For each cluster, a bit for each of the first 32 `mirrors` that light from there may come from.
+    pub mirror_reach: u64,
     /// Number of `filters`.
     pub filter_count: u32,
     /// Number of `layers`; all ones: unknown, a ray tests layers always.
@@ -53,8 +77,16 @@ pub struct TransportView {
     pub beyond_surface_count: u32,
     /// Most mirrors and portals on a path.
     pub max_depth: u32,
-    /// Most diffuse bounces.
+    /// Most bounces, of diffuse and mirrored light.
     pub bounces: u32,
+    /// Number of `mirrors` across which light is sampled.
+    pub mirror_count: u32,
+    /// Number of clusters in `mirror_reach`.
+    pub mirror_clusters: u32,
+    /// 1: glass and liquids mirror the rays of bounces.
+    pub mirroring_layers: u32,
+    /// To a multiple of eight bytes.
+    pub padding: u32,
 }
 
 /// The flares of a view.

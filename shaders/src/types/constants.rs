@@ -106,6 +106,8 @@ pub const MATERIAL_EMITTER: u32 = 2048;
 pub const MATERIAL_INVISIBLE: u32 = 4096;
 /// On the map's surfaces: casts no shadow, because the map compiler ignored it.
 pub const MATERIAL_PASSED: u32 = 8192;
+/// Mirrors light: a stage represents a reflection of the surroundings, or it is glass or a liquid.
+pub const MATERIAL_REFLECTS: u32 = 16384;
 
 /// Drawn in front of everything near (first-person weapon).
 pub const INSTANCE_DEPTH_HACK: u32 = 1;

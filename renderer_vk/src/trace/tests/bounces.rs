@@ -31,7 +31,12 @@ gpu_tests! {
 }
 
 /// The mean of a picture with one bounce: in reference mode, and in that of a game, which has passes of its own for it.
-fn by_each_way(gpu: &mut Gpu, scene: &Scene, settings: &Settings, frames: u32) -> [Vec3; 2] {
+pub(super) fn by_each_way(
+    gpu: &mut Gpu,
+    scene: &Scene,
+    settings: &Settings,
+    frames: u32,
+) -> [Vec3; 2] {
     let live = Settings {
         rt_accumulate: false,
         rt_denoiser: DenoiserChoice::ASvgf,
@@ -134,8 +139,8 @@ fn lightmap_brightness_scales_reflectance(gpu: &mut Gpu) {
 }
 
 fn gloss_throws_back_what_its_picture_shows(gpu: &mut Gpu) {
-    // a small white patch in a furnace with glossy walls: it receives their emission g and, with a second bounce, g a,
-    // where a is the mean of their image
+    // a small white patch in a furnace with glossy walls: it receives their emission g and, with a second bounce, g a from
+    // all around and g a by reflection, where a is the mean of their image
     let texels: Vec<u8> = [40u8, 216].iter().flat_map(|&v| [v, v, v, 255]).collect();
     let texels = [texels.clone(), texels].concat();
     let picture = square(gpu, 2, &texels);
@@ -158,7 +163,7 @@ fn gloss_throws_back_what_its_picture_shows(gpu: &mut Gpu) {
     let mut once = 0.0;
     for (bounces, exact) in [
         (1, glow),
-        (2, glow * (1.0 + decode(Vec3::splat(128.0 / 255.0)).x)),
+        (2, glow * (1.0 + 2.0 * decode(Vec3::splat(128.0 / 255.0)).x)),
     ] {
         let mean = gpu.mean(&scene, &bounced(bounces), 64).x;
         println!("{bounces}: {mean} {exact}");

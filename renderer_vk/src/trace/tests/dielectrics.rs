@@ -33,7 +33,7 @@ const ABOVE: f32 = 0.8;
 const BELOW: f32 = 0.3;
 
 /// Unpolarized reflectance by the angles, in the sine and tangent form; `None` for total reflection.
-fn fresnel(incident: f32, index: f32) -> Option<f32> {
+pub(super) fn fresnel(incident: f32, index: f32) -> Option<f32> {
     let sine = incident.sin() / index;
     if sine >= 1.0 {
         return None;

@@ -17,6 +17,7 @@ mod lighting;
 mod lights;
 mod maps;
 mod memory;
+mod mirrors;
 mod models;
 mod motion;
 mod parts;

@@ -9,7 +9,7 @@ use shaders::trace_types::{
 use shaders::types::{SunDisc, constants::NO_TEXTURE};
 
 use super::super::indirect::is_subsampled;
-use super::{DARK_ADAPTATION, LIGHT_ADAPTATION, TracedView, ViewTracer, is_lit};
+use super::{DARK_ADAPTATION, LIGHT_ADAPTATION, TracedMap, TracedView, ViewTracer, is_lit};
 use crate::gpu::{Error, Image, Recorder};
 use crate::raster::{FlareTest, WIDE_FORMAT};
 use crate::scene::{SUN_SIZE, TracedScene, perpendicular};
@@ -234,7 +234,18 @@ fn transport(rec: &mut Recorder, traced: &TracedView<'_>) -> Result<TransportVie
     };
     let camera = camera_frame(view).origin;
     let beyond = Beyond::of(view, camera, lens, geometry, materials);
+    let (mirror_reach, mirror_clusters) = geometry.map_or((0, 0), |g| g.mirrors.reach());
+    let [mirrors, mirror_of_surface] = geometry.map_or([0; 2], |g| g.mirrors.addresses());
     Ok(TransportView {
+        mirrors,
+        mirror_of_surface,
+        mirror_reach,
+        mirror_count: map.map_or(0, |m| mirror_count(&m, view, settings)),
+        mirror_clusters,
+        mirroring_layers: u32::from(
+            settings.rt_accumulate && geometry.is_some_and(|g| g.mirrors.has_layers()),
+        ),
+        padding: 0,
         filters: geometry.map_or(0, |g| g.surroundings.filters()),
         filter_count: geometry.map_or(0, |g| g.surroundings.filter_count()),
         layers,
@@ -246,6 +257,15 @@ fn transport(rec: &mut Recorder, traced: &TracedView<'_>) -> Result<TransportVie
         max_depth: settings.rt_max_depth,
         bounces: settings.rt_bounces.min(MOST_BOUNCES),
     })
+}
+
+/// Number of flat mirrors across which light is sampled.
+fn mirror_count(map: &TracedMap<'_>, view: &TracedScene, settings: &Settings) -> u32 {
+    // later bounces and portals lead out of sight
+    let shows_its_sight = settings.rt_bounces < 2 && view.look.portals.is_empty();
+    let camera = camera_frame(view).origin;
+    let cluster = shows_its_sight.then(|| map.lights.sight.cluster_at(camera));
+    (map.geometry.mirrors).count(settings.rt_accumulate, cluster.flatten())
 }
 
 /// The camera of a view, as two frames must share it to show equal directions.

@@ -114,6 +114,12 @@ impl Scene {
     }
 
     pub fn material(&mut self, stages: &[Stage], flags: u32) -> u32 {
+        let reflects = |stage: &Stage| stage.flags & c::STAGE_REFLECTION != 0;
+        let flags = if stages.iter().any(reflects) {
+            flags | c::MATERIAL_REFLECTS
+        } else {
+            flags
+        };
         let first = self.stages.len() as u32;
         self.stages.extend(stages);
         let index = self.materials.len() as u32;
