@@ -17,6 +17,11 @@ pub fn not_negative(text: &str) -> Result<f32, String> {
     number(text, "0 or a number above it", |n| n >= 0.0)
 }
 
+/// A part of something: 0 to 1.
+pub fn part(text: &str) -> Result<f32, String> {
+    number(text, "a number from 0 to 1", |n| (0.0..=1.0).contains(&n))
+}
+
 /// Finite numbers with commas or spaces between; `None` if anything else is among them.
 pub fn list(text: &str) -> Option<Vec<f32>> {
     let words = text
@@ -58,6 +63,8 @@ mod tests {
         assert!(positive("0").is_err() && positive("-1").is_err());
         assert_eq!(positive("1e-3"), Ok(1e-3));
         assert_eq!(not_negative("0"), Ok(0.0));
+        assert_eq!((part("0"), part("1")), (Ok(0.0), Ok(1.0)));
+        assert!(part("1.1").is_err() && part("-0.1").is_err() && part("NaN").is_err());
         assert!(not_negative("-1").is_err());
         assert!(count("0").is_err() && count("1.5").is_err() && count("-1").is_err());
         assert_eq!(count("3"), Ok(3));

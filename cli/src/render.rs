@@ -74,6 +74,10 @@ pub struct RenderArgs {
     /// Pictures of a --path, evenly along it; each has --spp frames
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
+    /// Motion blur: the part of the time from one picture to the next for which the shutter is open, 0 to 1. The --spp
+    /// frames of a picture are spread over it: along the --path before the picture's place, or over a --step
+    #[arg(long, value_name = "PART", value_parser = numbers::part, default_value_t = 0.0)]
+    shutter: f32,
     /// Light sampling of the traced look
     #[arg(long, value_enum, default_value = "resampled")]
     sampling: Sampling,
@@ -172,9 +176,10 @@ fn parse_lens(text: &str) -> Result<[f32; 2], String> {
         .ok_or_else(|| "a lens is DIAMETER,DISTANCE, numbers above 0, for example 4,200".to_owned())
 }
 
-/// A frame: its view, and the file of the picture after it, if any.
+/// A frame: its view, the number of frames after it that join its mean, and the file of the picture after it, if any.
 struct Shot {
     def: RefDef,
+    joined_by: u32,
     written: Option<PathBuf>,
 }
 
@@ -262,20 +267,24 @@ impl RenderArgs {
             let points = read_path(path)?;
             let shot = |point: &PathPoint| Shot {
                 def: point.ref_def(width, height),
+                joined_by: 0,
                 written: None,
             };
             let Some(count) = self.frames else {
                 return Ok(last(points.iter().map(shot).collect()));
             };
-            let count = count as usize;
+            // frames of the path from one picture to the next
+            let step = (points.len() - 1) as f32 / (count - 1).max(1) as f32;
+            let samples = self.samples();
             let mut shots = Vec::new();
             for number in 0..count {
-                let at = number * (points.len() - 1) / (count - 1).max(1);
-                let def = points[at].ref_def(width, height);
-                for sample in 1..=self.samples() {
+                for sample in 0..samples {
+                    let place = (number as f32 - self.before(sample)) * step;
+                    let point = path::camera_at(&points, place).context("an empty path")?;
                     shots.push(Shot {
-                        def,
-                        written: (sample == self.samples()).then(|| self.numbered(number)),
+                        def: point.ref_def(width, height),
+                        joined_by: self.joined_by(sample),
+                        written: (sample + 1 == samples).then(|| self.numbered(number)),
                     });
                 }
             }
@@ -296,7 +305,11 @@ impl RenderArgs {
                 def.view_axis = turned.axis();
             }
             if let Some([x, y, z, yaw]) = self.step {
-                let before = (frames - 1 - frame) as f32;
+                let before = if self.shutter > 0.0 {
+                    self.before(frame)
+                } else {
+                    (frames - 1 - frame) as f32
+                };
                 def.view_origin -= Vec3::new(x, y, z) * before;
                 let turned = Camera {
                     yaw: camera.yaw - yaw * before,
@@ -304,13 +317,32 @@ impl RenderArgs {
                 };
                 def.view_axis = turned.axis();
             }
-            Shot { def, written: None }
+            Shot {
+                def,
+                joined_by: self.joined_by(frame),
+                written: None,
+            }
         };
         Ok(last((0..frames).map(frame).collect()))
     }
 
+    /// Time of a frame of a picture before the end of its exposure, in intervals of pictures. The frames are spread
+    /// evenly, the last one at the end.
+    fn before(&self, sample: u32) -> f32 {
+        self.shutter * (1.0 - (sample + 1) as f32 / self.samples() as f32)
+    }
+
+    /// Number of frames after this one of a picture that join the mean, though they show something else.
+    fn joined_by(&self, sample: u32) -> u32 {
+        if self.shutter > 0.0 && sample == 0 {
+            self.samples() - 1
+        } else {
+            0
+        }
+    }
+
     /// File of a picture of a series: the output's name with its number.
-    fn numbered(&self, number: usize) -> PathBuf {
+    fn numbered(&self, number: u32) -> PathBuf {
         // a path that ends in `..` has no name; writing to it fails
         let stem = self.output.file_stem().unwrap_or_default();
         let extension = self.output.extension().unwrap_or_default();
@@ -326,6 +358,15 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         bail!(
             "--frames is the number of pictures of a --path; --spp is the number of frames drawn for one picture"
         );
+    }
+    if args.shutter > 0.0 && args.frames.is_none() && args.step.is_none() {
+        bail!("--shutter blurs what moves: give a --path with --frames, or a --step");
+    }
+    if args.shutter > 0.0 && args.look() == Look::Classic {
+        bail!("--shutter is for the traced look; the classic one draws a single frame");
+    }
+    if args.shutter > 0.0 && args.no_accumulation {
+        bail!("--shutter is a mean of frames; leave out --no-accumulation");
     }
     let settings = args.settings();
     let denoiser = args.denoise.filter(&settings)?;
@@ -354,8 +395,12 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     renderer.count_rays(args.stats);
     // standard output has the JSON only
     let json = args.stats || args.timings;
-    for Shot { def, written } in &shots {
+    for shot in &shots {
+        let Shot { def, written, .. } = shot;
         let stats = draw(&mut renderer, &entities, def)?;
+        if shot.joined_by > 0 {
+            renderer.join_frames(shot.joined_by);
+        }
         timings.add(&renderer, &stats);
         if let Some(path) = written {
             timings.finish(&mut renderer)?;

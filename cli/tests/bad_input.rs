@@ -111,6 +111,7 @@ fn numbers_that_make_no_sense_are_refused() {
         (RENDER, "--fov", "NaN", "from 1 to 170 degrees"),
         (RENDER, "--spp", "0", "0 is not in 1.."),
         (RENDER, "--frames", "0", "0 is not in 1.."),
+        (RENDER, "--shutter", "1.5", "from 0 to 1"),
         (RENDER, "--candidates", "0", "from 1 to 64"),
         (RENDER, "--bounces", "17", "from 0 to 16"),
         (RENDER, "--denoiser", "3", "from 0 to 2"),

@@ -48,6 +48,26 @@ impl PathPoint {
         }
     }
 
+    /// The camera a part of the way from one to another; angles take the shorter way.
+    pub fn between(&self, other: &Self, part: f32) -> Self {
+        let mix = |from: f32, to: f32| from + (to - from) * part;
+        let turn =
+            |from: f32, to: f32| from + ((to - from + 180.0).rem_euclid(360.0) - 180.0) * part;
+        let (a, b) = (self.angles, other.angles);
+        let time = f64::from(self.time_ms)
+            + (f64::from(other.time_ms) - f64::from(self.time_ms)) * f64::from(part);
+        #[allow(clippy::cast_possible_truncation)] // saturates
+        Self {
+            time_ms: time.round() as i32,
+            origin: self.origin.lerp(other.origin, part),
+            angles: Vec3::new(turn(a.x, b.x), turn(a.y, b.y), turn(a.z, b.z)),
+            fov: [
+                mix(self.fov[0], other.fov[0]),
+                mix(self.fov[1], other.fov[1]),
+            ],
+        }
+    }
+
     /// Forward, left, up.
     pub fn axis(&self) -> [Vec3; 3] {
         let [pitch, yaw, roll] = self.angles.map(f32::to_radians).to_array();
@@ -87,6 +107,18 @@ impl PathPoint {
             o.x, o.y, o.z, a.x, a.y, a.z
         )
     }
+}
+
+/// The camera at a place of a path, counted in frames from the first; before it and after the last, the path rests.
+/// `None`: the path is empty.
+pub fn camera_at(points: &[PathPoint], place: f32) -> Option<PathPoint> {
+    let last = points.len().checked_sub(1)?;
+    #[allow(clippy::cast_precision_loss)] // a number of frames
+    let place = place.clamp(0.0, last as f32);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // within the path
+    let index = place as usize;
+    let (from, to) = (points.get(index)?, points.get((index + 1).min(last))?);
+    Some(from.between(to, place.fract()))
 }
 
 /// Reads a path file.
@@ -145,6 +177,36 @@ mod tests {
         let again = PathPoint::of(&def);
         assert!(again.angles.distance(point.angles) < 1.0e-3, "{again:?}");
         assert!((again.fov[1] - point.fov[1]).abs() < 1.0e-3);
+    }
+
+    #[test]
+    fn cameras_between_frames_take_the_shorter_way() {
+        let point = |time_ms, x, yaw| PathPoint {
+            time_ms,
+            origin: Vec3::new(x, 0.0, 0.0),
+            angles: Vec3::new(0.0, yaw, 0.0),
+            fov: [90.0, 60.0],
+        };
+        let path = [point(0, 0.0, 170.0), point(50, 10.0, -170.0)];
+        let middle = camera_at(&path, 0.5).unwrap();
+        assert_eq!(middle.time_ms, 25);
+        assert_eq!(middle.origin.x, 5.0);
+        let straight = point(25, 5.0, 180.0).axis();
+        for (axis, exact) in middle.axis().into_iter().zip(straight) {
+            assert!(axis.distance(exact) < 1.0e-5, "{axis} {exact}");
+        }
+        assert_eq!(camera_at(&path, 0.0), Some(path[0]));
+        for place in [1.0, 7.0] {
+            assert!(
+                camera_at(&path, place)
+                    .unwrap()
+                    .origin
+                    .distance(path[1].origin)
+                    < 1.0e-5
+            );
+        }
+        assert_eq!(camera_at(&path, -1.0), Some(path[0]));
+        assert_eq!(camera_at(&[], 0.0), None);
     }
 
     #[test]

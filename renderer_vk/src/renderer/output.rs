@@ -373,6 +373,14 @@ impl Renderer {
         }
     }
 
+    /// Lets the next `frames` frames join the mean of `rt_accumulate` whatever they show, as light does on film while the
+    /// shutter is open: what moves is blurred.
+    pub fn join_frames(&mut self, frames: u32) {
+        if let Some(trace) = &mut self.trace {
+            trace.join_frames(frames);
+        }
+    }
+
     /// Replaces the mean of the accumulated frames by another linear picture before exposure, of the traced size, such
     /// as a filtered one: the next frames show it, with bloom, exposure and tone curve of their own, and leave it as it
     /// is, until their content changes. False if no frames are accumulated.

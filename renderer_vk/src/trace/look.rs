@@ -223,6 +223,14 @@ impl TraceLook {
         self.tracer.accumulated_frames()
     }
 
+    /// Lets the next `frames` frames join that mean whatever they show.
+    pub fn join_frames(&mut self, frames: u32) {
+        self.tracer.join_frames(frames);
+        if let Some(right) = &mut self.right {
+            right.join_frames(frames);
+        }
+    }
+
     /// Replaces that mean; false if there is none.
     ///
     /// # Errors

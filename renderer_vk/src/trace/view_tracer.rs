@@ -87,6 +87,8 @@ pub struct ViewTracer {
     pub(super) history: Option<CameraView>,
     /// Hash of the content of the accumulated frames, and their number.
     accumulated: (u64, u32),
+    /// Number of next frames that join the mean whatever their content.
+    joining: u32,
 }
 
 /// Time constants of adaptation to a brighter and to a darker view, seconds: after this time 1/e of the difference is
@@ -132,6 +134,7 @@ impl ViewTracer {
             last_time: 0.0,
             history: None,
             accumulated: (0, 0),
+            joining: 0,
         })
     }
 
@@ -165,6 +168,11 @@ impl ViewTracer {
         (self.device).upload_image(mean, 0, 0, bytemuck::cast_slice(texels))?;
         self.accumulated.1 = WHOLE_WEIGHT;
         Ok(true)
+    }
+
+    /// Lets the next `frames` accumulated frames join the mean whatever they show.
+    pub fn join_frames(&mut self, frames: u32) {
+        self.joining = frames;
     }
 
     /// Discards accumulated frames.
@@ -391,7 +399,9 @@ impl ViewTracer {
             return 0;
         }
         let key = content_hash(view, materials, settings);
-        let before = if self.accumulated.0 == key {
+        let joins = self.joining > 0;
+        self.joining = self.joining.saturating_sub(1);
+        let before = if joins || self.accumulated.0 == key {
             self.accumulated.1
         } else {
             0

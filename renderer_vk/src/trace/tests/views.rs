@@ -22,6 +22,7 @@ gpu_tests! {
         of_two_faces_in_one_plane_the_one_that_shows_is_met,
         the_sky_is_where_its_stages_say_and_lets_the_sun_in,
         display_white_keeps_its_brightness,
+        an_open_shutter_takes_the_mean_of_what_passes,
         exposure_adapts_to_surfaces_alone,
         frames_can_be_made_again_bit_by_bit,
     ],
@@ -462,4 +463,47 @@ fn all_tracers_make_the_same_picture() {
         // the driver's traversal of the same structures
         assert!(differing(&c) < a.len() / 200, "{}", differing(&c));
     }
+}
+
+fn an_open_shutter_takes_the_mean_of_what_passes(gpu: &mut Gpu) {
+    // the camera moves along a wall of stripes: each pixel is the mean of what passes it
+    const FRAMES: u32 = 8;
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 40.0, 16);
+    let [dark, bright] =
+        [0.1, 0.7].map(|glow| scene.material(&[stage::constant([encode(glow); 3])], 0));
+    scene.quad(screen(200.0), dark);
+    for stripe in -20..20 {
+        let corner = Vec3::new(100.0, 12.0 * stripe as f32, -100.0);
+        let points = rectangle(corner, Vec3::Z * 200.0, Vec3::Y * 4.0);
+        scene.quad(points, bright);
+    }
+    let place = |frame: u32| Vec3::Y * (1.3 * frame as f32);
+    let mut exact = vec![Vec3::ZERO; 256];
+    // a pixel's ray is at the same place in a frame alone as among others
+    let middles = Settings {
+        rt_taa: false,
+        ..reference()
+    };
+    let mut sums = [0.0; 2];
+    for frame in 0..FRAMES {
+        scene.def.view_origin = place(frame);
+        let (pixels, _) = gpu.render(&scene, &middles, 16);
+        for (sum, pixel) in exact.iter_mut().zip(pixels) {
+            *sum += pixel / FRAMES as f32;
+        }
+    }
+    gpu.look.join_frames(16 * FRAMES);
+    let (blurred, _) = gpu.render_path(&scene, &middles, 16 * FRAMES, |frame, def| {
+        def.view_origin = place(frame / 16);
+    });
+    for (pixel, exact) in blurred.iter().zip(&exact) {
+        // other samples of the pixels that an edge crosses
+        assert!((pixel.x - exact.x).abs() < 0.04, "{pixel} {exact}");
+        sums[0] += pixel.x;
+        sums[1] += exact.x;
+    }
+    assert!((sums[0] / sums[1] - 1.0).abs() < 0.005, "{sums:?}");
+    // stripes alone would be dark or bright
+    let between = blurred.iter().filter(|p| p.x > 0.15 && p.x < 0.65).count();
+    assert!(between > 200, "{between}");
 }
