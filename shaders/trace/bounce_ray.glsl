@@ -11,8 +11,11 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) buffer BounceTexel
 // The pixel of a cell that this run gathers for: the frame's own, or each of the four in turns. May be off the picture.
 ivec2 bounce_pixel(ivec2 cell) {
     if ((VIEW.flags & VIEW_SUBSAMPLED_BOUNCE) != 0) return subsample_pixel(cell);
-    return cell * CELL + ivec2(push.part & 1u, push.part >> 1u);
+    return cell * CELL + ivec2(push.part & 1u, push.part >> 1u & 1u);
 }
+
+// Number of paths that the pixel has gathered by before this run.
+uint bounce_round() { return push.part >> 2; }
 
 bool is_last_bounce() { return push.number + 1 >= VIEW.transport.bounces; }
 

@@ -14,14 +14,20 @@ pub fn is_subsampled(settings: &Settings) -> bool {
     denoise::in_use(settings) != DenoiserChoice::None && settings.rt_bounces > 0
 }
 
-/// Records the passes that gather bounced light. Where all pixels gather, the four of a cell take turns, so that the
+/// Records the passes that gather bounced light, `samples` paths for each pixel that gathers. Where all pixels gather, the four of a cell take turns, so that the
 /// paths of a quarter of the pixels need memory.
 ///
 /// # Errors
 /// Out of memory, or the driver refuses a pipeline.
-pub fn record(passes: &mut FramePasses<'_>, transport: &TransportView) -> Result<(), Error> {
+pub fn record(
+    passes: &mut FramePasses<'_>,
+    transport: &TransportView,
+    samples: u32,
+) -> Result<(), Error> {
     let parts = if passes.facts.subsampled { 1 } else { 4 };
-    for part in 0..parts {
+    // the round is in the bits above those of the pixel
+    let runs = (0..samples).flat_map(|round| (0..parts).map(move |part| part | round << 2));
+    for part in runs {
         for bounce in 0..transport.bounces {
             if transport.mirror_count > 0 {
                 passes.run_numbered(Pass::MirrorLight, bounce, part)?;

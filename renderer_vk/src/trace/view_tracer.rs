@@ -333,7 +333,7 @@ impl ViewTracer {
         self.denoiser.reproject_gradients(passes)?;
         light_directly(passes, settings, params)?;
         if facts.bounces {
-            indirect::record(passes, &params.transport)?;
+            indirect::record(passes, &params.transport, settings.rt_samples)?;
         } else {
             clear_indirect(targets, passes)?;
         }
@@ -447,6 +447,7 @@ pub fn samples_one_light(settings: &Settings) -> bool {
     is_lit(settings)
         && settings.rt_light_selection == LightSelection::Resampled
         && settings.rt_num_random_dl == 1
+        && settings.rt_samples == 1
 }
 
 /// Clears bounced light, unless it is black. The adaptive denoiser, whose image holds other data meanwhile, does not

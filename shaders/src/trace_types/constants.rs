@@ -182,6 +182,8 @@ pub const STREAM_SUN_PASS: u32 = 5;
 pub const STREAMS: u32 = 6;
 /// Light across mirrors of the first bounce: after the streams of three passes of 16 bounces.
 pub const STREAM_MIRRORS: u32 = 290;
+/// Distance between the streams of one path of a pixel and those of the next.
+pub const STREAM_ROUND: u32 = 4096;
 
 /// Streams of the denoiser's random numbers (`dither` in `denoise.glsl`): rounding of the fresh light; with
 /// `rt_denoiser 2` of the number of frames.

@@ -41,7 +41,7 @@ pub struct PassStep {
     pub view: u64,
     /// Number of the run, of a pass with several: of the bounce, or 1 for the other side of split paths.
     pub number: u32,
-    /// Pixel of each cell of 2 × 2, where they take turns.
+    /// Pixel of each cell of 2 × 2, where they take turns; from bit 2 on, the number of the pixel's path.
     pub part: u32,
 }
 

@@ -23,6 +23,7 @@ gpu_tests! {
         a_red_wall_colours_the_floor,
         a_bounce_has_one_ray_for_lamps_and_sun,
         bounced_light_passes_fog,
+        samples_of_a_frame_divide_its_noise,
     ],
     each: [
         no_light_leaks_through_walls,
@@ -117,9 +118,15 @@ fn a_furnace_sums_its_bounces(gpu: &mut Gpu) {
             );
         }
         // of a game's frames a quarter of the pixels gathers, and the roulette makes long paths noisy
-        for (bounces, frames, error) in [(1, 16, 0.003), (4, 64, 0.008)] {
+        for (bounces, samples, frames, error) in
+            [(1, 1, 16, 0.003), (4, 1, 64, 0.008), (4, 3, 64, 0.006)]
+        {
             let exact = seen(e, a, light_of(bounces));
-            let [_, live] = by_each_way(gpu, &scene, &bounced(bounces), frames);
+            let settings = Settings {
+                rt_samples: samples,
+                ..bounced(bounces)
+            };
+            let [_, live] = by_each_way(gpu, &scene, &settings, frames);
             println!("albedo {albedo}, {bounces}, as a game shows it: {live} {exact}");
             assert!((live.x / exact - 1.0).abs() < error, "{live} {exact}");
         }
@@ -341,5 +348,59 @@ fn bounced_light_passes_tinted_glass(gpu: &mut Gpu) {
             (mean / exact - 1.0).abs().max_element() < 0.01,
             "{mean} {exact}"
         );
+    }
+}
+
+fn samples_of_a_frame_divide_its_noise(gpu: &mut Gpu) {
+    const FRAMES: u32 = 64;
+    // lit by a lamp behind a wall alone, so that all light is bounced; and by lamps in sight
+    for (hidden, bounces) in [(true, 2), (false, 0)] {
+        let mut scene = Scene::hall(20.0, 0.6, 16);
+        if hidden {
+            scene.point(Vec3::new(100.0, 60.0, -40.0), 60_000.0, 4.0);
+        } else {
+            for i in 0..20 {
+                let at = Vec3::new(-100.0 + 15.0 * i as f32, 40.0, 60.0);
+                scene.point(at, 1000.0 + 300.0 * i as f32, 4.0);
+            }
+        }
+        // mean, and variance from frame to frame
+        let mut measured = |samples: u32, denoiser| {
+            let settings = Settings {
+                rt_accumulate: false,
+                rt_denoiser: denoiser,
+                rt_taa: false,
+                rt_antialiasing: false,
+                rt_samples: samples,
+                ..bounced(bounces)
+            };
+            let mut sums = vec![[0.0f64; 2]; 256];
+            let mut add = |_, pixels: &[Vec3]| {
+                for (sums, pixel) in sums.iter_mut().zip(pixels) {
+                    sums[0] += f64::from(pixel.x);
+                    sums[1] += f64::from(pixel.x).powi(2);
+                }
+            };
+            gpu.render_watched(&scene, &settings, FRAMES, |_, _| {}, Some(&mut add));
+            let frames = f64::from(FRAMES);
+            let mean = sums.iter().map(|s| s[0] / frames).sum::<f64>() / 256.0;
+            let variance = |s: &[f64; 2]| s[1] / frames - (s[0] / frames).powi(2);
+            (mean, sums.iter().map(variance).sum::<f64>() / 256.0)
+        };
+        let (mean, noise) = measured(1, DenoiserChoice::None);
+        for samples in [2, 4, 8] {
+            let (mean_of_more, less) = measured(samples, DenoiserChoice::None);
+            println!(
+                "{samples}: {} of the light, {} of the noise",
+                mean_of_more / mean,
+                less / noise
+            );
+            assert!(
+                (mean_of_more / mean - 1.0).abs() < 0.02,
+                "{mean_of_more} {mean}"
+            );
+            let share = less / noise * f64::from(samples);
+            assert!((0.8..1.25).contains(&share), "{samples}: {share}");
+        }
     }
 }

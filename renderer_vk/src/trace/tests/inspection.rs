@@ -65,6 +65,14 @@ fn rays_are_counted_exactly_and_only_when_asked(gpu: &mut Gpu) {
     gpu.render(&scene, &denoised, 4);
     let rays = gpu.rays().expect("counted");
     assert_eq!(rays, [pixels, 0, pixels, pixels / 4, 0, 0, 0]);
+    // three paths in place of one
+    let thrice = Settings {
+        rt_samples: 3,
+        ..denoised
+    };
+    gpu.render(&scene, &thrice, 4);
+    let rays = gpu.rays().expect("counted");
+    assert_eq!(rays, [pixels, 0, pixels, 3 * pixels / 4, 0, 0, 0]);
     // rays to the sampled light of each pixel, and to a sun
     let mut sunny = lit_floor();
     sunny.sun(Vec3::Z, 1.0, 0.01);
