@@ -34,6 +34,8 @@ vec3 filtered(vec3 origin, vec3 direction, float distance) {
         Dielectric dielectric = material_of(p.triangle.material).dielectric;
         if (dielectric.filters == 0 || (p.triangle.flags & TRIANGLE_WORLD) == 0) continue;
         if (hit.t < FILTER_CLEARANCE) continue;
+        // a body's tint counts once
+        if ((p.triangle.flags & TRIANGLE_SOLID) != 0 && dot(p.face_normal, direction) > 0.0) continue;
         color *= dielectric.filter_color;
         // the light travels against the ray, so it enters from outside, without total reflection
         if (dielectric.index > 0.0) color *= 1.0 - fresnel(abs(dot(p.face_normal, direction)), dielectric.index);

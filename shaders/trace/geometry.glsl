@@ -79,7 +79,7 @@ SurfacePoint surface_point(Hit hit) {
 // Whether the material culls the side that the ray hits.
 bool is_culled(SurfacePoint p, vec3 direction) {
     uint material_flags = material_of(p.triangle.material).flags;
-    if ((material_flags & MATERIAL_TWO_SIDED) != 0 || (p.triangle.flags & TRIANGLE_FACES_CAMERA) != 0) return false;
+    if ((material_flags & MATERIAL_TWO_SIDED) != 0 || (p.triangle.flags & (TRIANGLE_FACES_CAMERA | TRIANGLE_SOLID)) != 0) return false;
     bool from_front = dot(p.face_normal, direction) < 0.0;
     return from_front == ((material_flags & MATERIAL_CULL_BACK) != 0);
 }

@@ -16,7 +16,7 @@ float layer_reflectance(SurfacePoint p, vec3 direction) {
     Material material = material_of(p.triangle.material);
     if (!(material.dielectric.index > 0.0)) return 0.0;
     float mirrored = fresnel(min(abs(dot(p.face_normal, direction)), 1.0), material.dielectric.index);
-    bool pane = (material.flags & (MATERIAL_LIQUID | MATERIAL_TWO_SIDED)) == 0;
+    bool pane = (material.flags & (MATERIAL_LIQUID | MATERIAL_TWO_SIDED)) == 0 && (p.triangle.flags & TRIANGLE_SOLID) == 0;
     return pane ? fresnel_pane(mirrored) : mirrored;
 }
 

@@ -96,27 +96,30 @@ struct Interface {
     float eta;
     float mirrored; // share of the light that is reflected
     uint bend;
-    bool liquid;
+    bool refracts;
     bool enters;
 };
 
-// Glass in maps is panes: the second face, usually culled, reverses the refraction of the first, so rays pass straight.
+// Liquids and closed bodies of glass refract. Other glass is panes: the second face, usually culled, reverses the
+// refraction of the first, so rays pass straight.
 Interface interface_at(Path path, SurfacePoint p, Material material, float width) {
     Dielectric dielectric = material.dielectric;
     Interface i;
-    i.liquid = (material.flags & MATERIAL_LIQUID) != 0;
+    bool solid = (p.triangle.flags & TRIANGLE_SOLID) != 0;
+    i.refracts = solid || (material.flags & MATERIAL_LIQUID) != 0;
     i.enters = dot(p.face_normal, path.direction) < 0.0;
     i.face = i.enters ? p.face_normal : -p.face_normal;
-    i.normal = ripple_normal(i.face, p.position, dielectric.ripple, width, p.stage.time);
+    vec3 smooth_normal = dot(p.normal, i.face) < 0.0 ? -p.normal : p.normal;
+    i.normal = ripple_normal(solid ? smooth_normal : i.face, p.position, dielectric.ripple, width, p.stage.time);
     float cosine = -dot(i.normal, path.direction);
     if (cosine <= 0.0) {
         i.normal = i.face;
         cosine = -dot(i.face, path.direction);
     }
     i.bend = dielectric.ripple > 0.0 ? BENT_BY_RIPPLES : BENT_BY_SHAPE;
-    i.eta = !i.liquid || i.enters ? dielectric.index : 1.0 / dielectric.index;
+    i.eta = !i.refracts || i.enters ? dielectric.index : 1.0 / dielectric.index;
     i.mirrored = fresnel(min(cosine, 1.0), i.eta);
-    if (!i.liquid && (material.flags & MATERIAL_TWO_SIDED) == 0) i.mirrored = fresnel_pane(i.mirrored);
+    if (!i.refracts && (material.flags & MATERIAL_TWO_SIDED) == 0) i.mirrored = fresnel_pane(i.mirrored);
     return i;
 }
 

@@ -8,7 +8,8 @@ use glam::{Vec2, Vec3};
 use shaders::trace_types::SkyRecord;
 use shaders::types::Triangle;
 use shaders::types::constants::{
-    NO_TEXTURE, TRIANGLE_CURVED, TRIANGLE_ONE_SIDED, TRIANGLE_STATIC, TRIANGLE_WORLD,
+    NO_TEXTURE, TRIANGLE_CURVED, TRIANGLE_ONE_SIDED, TRIANGLE_SOLID, TRIANGLE_STATIC,
+    TRIANGLE_WORLD,
 };
 use support::Aabb;
 use support::slice;
@@ -21,6 +22,7 @@ use super::input::{Kind, MaterialInfo, MaterialTable, StaticScene, StaticSurface
 use super::layer_boxes::{StaticLayer, bounds_of};
 use super::lifted::lifted;
 use super::mirrors::Mirrors;
+use super::solids::solid_surfaces;
 use super::surroundings::Surroundings;
 use super::tracer::Tracer;
 use crate::gpu::{Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error};
@@ -190,6 +192,7 @@ fn members<'a>(
 /// The triangles of all structures, each with a range of them.
 fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
     let doubled = doubled(scene, materials);
+    let solids = solid_surfaces(scene, materials);
     let sorted = members(scene, materials, &doubled);
     let mut grouped = Grouped {
         triangles: Vec::new(),
@@ -235,14 +238,17 @@ fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
                     Portion::Doubled(true) => TRIANGLE_ONE_SIDED,
                     _ => sides(key.1),
                 };
-                let curved = if surface.curved { TRIANGLE_CURVED } else { 0 };
+                let mut shape = if surface.curved { TRIANGLE_CURVED } else { 0 };
+                if solids.contains(&surface.number) {
+                    shape |= TRIANGLE_SOLID;
+                }
                 grouped.triangles.push(Triangle {
                     indices,
                     material,
                     instance: surface.number,
                     fog: surface.fog,
                     lightmap,
-                    flags: TRIANGLE_WORLD | TRIANGLE_STATIC | curved | sides | rank_bits(&info),
+                    flags: TRIANGLE_WORLD | TRIANGLE_STATIC | shape | sides | rank_bits(&info),
                 });
             }
         }

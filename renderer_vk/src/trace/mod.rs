@@ -44,6 +44,7 @@ mod parts;
 pub mod pass_set;
 pub mod passes;
 mod shapes;
+mod solids;
 pub mod still;
 pub mod surroundings;
 pub mod targets;

@@ -171,3 +171,5 @@ pub const TRIANGLE_ONE_SIDED: u32 = 4;
 pub const TRIANGLE_STATIC: u32 = 8;
 /// The triangle is part of a curve or a model: its vertex normals imply a curved surface.
 pub const TRIANGLE_CURVED: u32 = 16;
+/// The triangle belongs to a closed body of glass, which refracts: both sides are hit.
+pub const TRIANGLE_SOLID: u32 = 32;

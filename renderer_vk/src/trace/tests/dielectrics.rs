@@ -23,6 +23,8 @@ gpu_tests! {
         the_texture_of_what_shines_is_seen_in_every_pixel,
         a_shiny_pixel_alone_is_as_bright_as_its_surface,
         light_takes_on_the_colour_of_what_it_passes,
+        a_ball_of_glass_bends_rays_as_a_sphere,
+        a_block_of_glass_shifts_rays_and_a_pane_does_not,
     ],
 }
 
@@ -390,5 +392,123 @@ fn light_takes_on_the_colour_of_what_it_passes(gpu: &mut Gpu) {
             exact *= grey;
         }
         assert!((*pixel - exact).abs().max_element() < 0.005, "{p} {pixel}");
+    }
+}
+
+/// Radiance of a wall across the view, on both sides of a boundary.
+const LEFT: f32 = 0.8;
+const RIGHT: f32 = 0.2;
+const WALL: f32 = 300.0;
+
+/// A view along x of a wall that changes at y = `boundary`.
+fn wall_in_two_parts(boundary: f32) -> Scene {
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, SIDE as i32);
+    let [left, right] =
+        [LEFT, RIGHT].map(|v| scene.material(&[stage::constant([encode(v); 3])], 0));
+    let (up, across) = (Vec3::Z * 8000.0, Vec3::Y * 4000.0);
+    let corner = Vec3::new(WALL, boundary, -4000.0);
+    scene.quad(rectangle(corner, up, across), left);
+    scene.quad(rectangle(corner - across, up, across), right);
+    scene
+}
+
+/// Clear glass of index 1.5.
+fn glass(scene: &mut Scene) -> u32 {
+    let flags = c::MATERIAL_GLASS | c::MATERIAL_TRANSLUCENT | c::MATERIAL_REFLECTS;
+    let glass = scene.material(&[clear()], flags);
+    scene.materials[glass as usize].0.dielectric = Dielectric {
+        index: 1.5,
+        scale: 1.0,
+        ..Dielectric::default()
+    };
+    glass
+}
+
+/// The part of light that a face lets through.
+fn passed(direction: Vec3, normal: Vec3, index: f32) -> f32 {
+    let incident = direction.dot(normal).abs().min(1.0).acos();
+    1.0 - fresnel(incident, index).unwrap_or(1.0)
+}
+
+fn a_ball_of_glass_bends_rays_as_a_sphere(gpu: &mut Gpu) {
+    let mut scene = wall_in_two_parts(0.0);
+    let material = glass(&mut scene);
+    let (center, radius) = (Vec3::X * 100.0, 20.0);
+    scene.ball(center, radius, 48, material, true);
+    let (pixels, _) = gpu.render(&scene, &middles(), 256);
+    let (mut compared, mut sums) = (0, [0.0; 2]);
+    for (i, pixel) in pixels.iter().enumerate() {
+        let d = direction(&scene, i);
+        let nearest = d.dot(center);
+        let off = (d * nearest - center).length();
+        // the edge of the ball, and of the wall's parts
+        if off > 0.7 * radius {
+            continue;
+        }
+        let entry = d * (nearest - (radius * radius - off * off).sqrt());
+        let normal = (entry - center) / radius;
+        let inner = d.refract(normal, 1.0 / 1.5);
+        let exit = entry + inner * (-2.0 * inner.dot(normal * radius));
+        let behind = (exit - center) / radius;
+        let outer = inner.refract(-behind, 1.5);
+        let y = exit.y + outer.y * (WALL - exit.x) / outer.x;
+        if y.abs() < 10.0 {
+            continue;
+        }
+        let straight = if d.y > 0.0 { LEFT } else { RIGHT };
+        let seen = if y > 0.0 { LEFT } else { RIGHT };
+        assert!(seen != straight, "a ball turns the picture around");
+        let share = passed(d, normal, 1.5) * passed(inner, behind, 1.0 / 1.5);
+        let exact = through_byte(encode(seen)) * share;
+        // a tenth of the frames follow what the second face mirrors
+        assert!((pixel.x / exact - 1.0).abs() < 0.1, "{i}: {pixel} {exact}");
+        compared += 1;
+        sums[0] += pixel.x;
+        sums[1] += exact;
+    }
+    println!("{compared} pixels: {}", sums[0] / sums[1]);
+    assert!(compared > 30, "{compared}");
+    assert!((sums[0] / sums[1] - 1.0).abs() < 0.01, "{sums:?}");
+}
+
+fn a_block_of_glass_shifts_rays_and_a_pane_does_not(gpu: &mut Gpu) {
+    for thickness in [60.0, 16.0] {
+        // a column of pixels that sees the right part by a shift alone
+        let column = 4;
+        let plain = Scene::new(Vec3::ZERO, Vec3::X, 30.0, SIDE as i32);
+        let d = direction(&plain, 12 * SIDE + column);
+        let inner = d.refract(Vec3::NEG_X, 1.0 / 1.5);
+        let shift = 60.0 * (d.y / d.x - inner.y / inner.x);
+        let straight = WALL * d.y / d.x;
+        let mut scene = wall_in_two_parts(straight - 0.5 * shift);
+        assert!(shift > 2.0, "{shift}");
+        let material = glass(&mut scene);
+        let (mins, maxs) = (
+            Vec3::new(80.0, -200.0, -200.0),
+            Vec3::new(80.0 + thickness, 200.0, 200.0),
+        );
+        // the faces of a room, turned outwards
+        let first = scene.surfaces.len();
+        scene.room(mins, maxs, material);
+        for surface in &scene.surfaces[first..] {
+            let start = surface.first_index as usize;
+            for triangle in scene.indices[start..start + 6].chunks_exact_mut(3) {
+                triangle.swap(1, 2);
+            }
+        }
+        let (pixels, _) = gpu.render(&scene, &middles(), 256);
+        let pixel = pixels[12 * SIDE + column].x;
+        let face = 1.0 - passed(d, Vec3::X, 1.5);
+        let (part, share) = if thickness > 16.0 {
+            (
+                RIGHT,
+                passed(d, Vec3::X, 1.5) * passed(inner, Vec3::X, 1.0 / 1.5),
+            )
+        } else {
+            (LEFT, 1.0 - 2.0 * face / (1.0 + face))
+        };
+        let exact = through_byte(encode(part)) * share;
+        println!("{thickness}: {pixel} {exact}");
+        assert!((pixel - exact).abs() < 0.03, "{thickness}: {pixel} {exact}");
     }
 }
