@@ -1,6 +1,6 @@
 //! The flat mirrors of a map, across which light is sampled.
 //!
-//! Light that a flat mirror throws comes from the mirror image of the lamp. A path finds it by a light sample in the
+//! Light that a flat mirror reflects comes from the mirror image of the lamp. A path finds it by a light sample in the
 //! mirrored space (`mirror_light.rgen`); a random direction would hardly ever lead through the mirror to a small lamp.
 //! Live frames use the largest mirrors, and at a point those that its cluster may see.
 
@@ -37,7 +37,7 @@ pub struct Mirrors {
     /// Boxes around the surfaces of each of the first [`MASKED`] planes.
     boxes: Vec<Vec<Aabb>>,
     reach: Option<Buffer>,
-    /// For each cluster, the planes that throw light on a cluster which it sees: bits as in `reach`.
+    /// For each cluster, the planes that reflect light onto a cluster which it sees: bits as in `reach`.
     in_sight: Vec<u32>,
 }
 
@@ -77,7 +77,7 @@ impl Mirrors {
         })
     }
 
-    /// Finds the clusters on which each of the first planes may throw light.
+    /// Finds the clusters on which each of the first planes may reflect light.
     ///
     /// # Errors
     /// Out of memory.

@@ -276,7 +276,7 @@ passes! {
         writes: &[DirectLight],
         counter: Some(t::COUNT_DIRECT),
     }
-    /// Light that flat mirrors of the map throw on the surfaces from which a bounce starts.
+    /// Light that flat mirrors of the map reflect onto the surfaces from which a bounce starts.
     MirrorLight = "trace_mirror_light", Rays(&shaders::TRACE_MIRROR_LIGHT), Cells {
         reads: &[Scene, Lights, GBuffer, Positions, Normals],
         may_read: &[GradientPixels, BounceLights],

@@ -21,12 +21,12 @@ gpu_tests! {
         a_lamp_below_a_mirror_ceiling_lights_the_floor,
         a_point_light_shows_the_outline_of_the_mirror,
         the_sun_off_a_mirror_lights_the_shade,
-        curved_and_flat_mirrors_throw_the_same_light,
+        curved_and_flat_mirrors_reflect_the_same_light,
         the_suns_disc_is_met_by_chance,
         a_furnace_of_mirrors_keeps_its_energy,
         light_passes_portals,
         many_mirrors_are_sampled_by_their_size,
-        water_and_panes_throw_light_by_fresnel,
+        water_and_panes_reflect_light_by_fresnel,
         bounces_share_light_between_both_sides_of_water,
     ],
     each: [
@@ -173,7 +173,7 @@ fn the_sun_off_a_mirror_lights_the_shade(gpu: &mut Gpu) {
 /// Settings of a long reference picture.
 const FRAMES: u32 = 512;
 
-fn curved_and_flat_mirrors_throw_the_same_light(gpu: &mut Gpu) {
+fn curved_and_flat_mirrors_reflect_the_same_light(gpu: &mut Gpu) {
     // light is sampled across a flat mirror; rays from a curved one have to meet the lamp
     let (image, grey) = grey_image(gpu, 160);
     for curved in [false, true] {
@@ -320,7 +320,7 @@ fn layer_above(scene: &mut Scene, flags: u32, index: f32) {
     scene.quad(ceiling_at(HEIGHT, 40_000.0), layer);
 }
 
-fn water_and_panes_throw_light_by_fresnel(gpu: &mut Gpu) {
+fn water_and_panes_reflect_light_by_fresnel(gpu: &mut Gpu) {
     let glass = c::MATERIAL_GLASS | c::MATERIAL_TRANSLUCENT;
     // points on the lamp's mirror image, whose area is 450
     let [a, b, c] = LAMP[1];
@@ -334,7 +334,7 @@ fn water_and_panes_throw_light_by_fresnel(gpu: &mut Gpu) {
         layer_above(&mut scene, flags, index);
         scene.light(LAMP[0], Vec3::splat(50.0));
         let points: Vec<Vec3> = floor_points(&scene).collect();
-        let thrown = |way: Vec3| {
+        let reflected = |way: Vec3| {
             let cosine = way.z / way.length();
             let face = fresnel(cosine.acos(), index).expect("no total reflection");
             let share = if what == "pane" {
@@ -345,7 +345,7 @@ fn water_and_panes_throw_light_by_fresnel(gpu: &mut Gpu) {
             share * cosine * cosine / way.length_squared()
         };
         let sum: f32 = (points.iter())
-            .map(|p| spots.iter().map(|spot| thrown(spot - p)).sum::<f32>())
+            .map(|p| spots.iter().map(|spot| reflected(spot - p)).sum::<f32>())
             .sum();
         let exact = 50.0 * 450.0 / PI * sum / (points.len() * spots.len()) as f32;
         for mean in by_each_way(gpu, &scene, &bounced(1), 64) {
