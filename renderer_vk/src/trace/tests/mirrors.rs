@@ -257,7 +257,7 @@ fn a_furnace_of_mirrors_keeps_its_energy(gpu: &mut Gpu) {
     assert!(part < 0.9, "{part}");
     for bounces in [1, 2, 3, 8] {
         let exact = glow * (1.0 - part.powi(bounces)) / (1.0 - part);
-        let mean = gpu.mean(&scene, &bounced(bounces as u32), 256).x;
+        let mean = gpu.mean(&scene, &bounced(bounces as u32), 64).x;
         is_near(&format!("{bounces} bounces"), mean, exact, 0.01);
     }
 }
