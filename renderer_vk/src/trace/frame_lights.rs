@@ -175,7 +175,11 @@ impl MapLights {
             LightSelection::Uniform => c::SELECT_UNIFORM,
             LightSelection::Resampled => c::SELECT_RESAMPLED,
         };
-        lights.samples = settings.rt_num_random_dl.max(1) * settings.rt_samples;
+        // all lights are one estimate
+        lights.samples = match settings.rt_num_random_dl {
+            0 => 1,
+            picked => picked * settings.rt_samples,
+        };
         lights.candidates = settings.rt_candidates.max(1);
         lights.scale = settings.rt_light_scale.max(0.0);
         lights.ambient = self.ambient * lights.scale;

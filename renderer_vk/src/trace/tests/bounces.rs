@@ -365,12 +365,13 @@ fn samples_of_a_frame_divide_its_noise(gpu: &mut Gpu) {
             }
         }
         // mean, and variance from frame to frame
-        let mut measured = |samples: u32, denoiser| {
+        let mut measured = |lights: u32, samples: u32| {
             let settings = Settings {
                 rt_accumulate: false,
-                rt_denoiser: denoiser,
+                rt_denoiser: DenoiserChoice::None,
                 rt_taa: false,
                 rt_antialiasing: false,
+                rt_num_random_dl: lights,
                 rt_samples: samples,
                 ..bounced(bounces)
             };
@@ -387,9 +388,16 @@ fn samples_of_a_frame_divide_its_noise(gpu: &mut Gpu) {
             let variance = |s: &[f64; 2]| s[1] / frames - (s[0] / frames).powi(2);
             (mean, sums.iter().map(variance).sum::<f64>() / 256.0)
         };
-        let (mean, noise) = measured(1, DenoiserChoice::None);
+        let (mean, noise) = measured(1, 1);
+        if !hidden {
+            // all lights at once give the same light, however many samples are wanted
+            for samples in [1, 4] {
+                let (all, _) = measured(0, samples);
+                assert!((all / mean - 1.0).abs() < 0.02, "{samples}: {all} {mean}");
+            }
+        }
         for samples in [2, 4, 8] {
-            let (mean_of_more, less) = measured(samples, DenoiserChoice::None);
+            let (mean_of_more, less) = measured(1, samples);
             println!(
                 "{samples}: {} of the light, {} of the noise",
                 mean_of_more / mean,
