@@ -75,8 +75,9 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
     /// Motion blur: the part of the time from one picture to the next for which the shutter is open, 0 to 1. The --spp
-    /// frames of a picture are spread over it: along the --path before the picture's place, or over a --step
-    #[arg(long, value_name = "PART", value_parser = numbers::part, default_value_t = 0.0)]
+    /// frames of a picture are spread over it: along the --path before the picture's place, or over a --step. Not with
+    /// --denoise, whose guides are sharp
+    #[arg(long, value_name = "PART", value_parser = numbers::part, default_value_t = 0.0, conflicts_with_all = ["denoise", "no_accumulation"])]
     shutter: f32,
     /// Light sampling of the traced look
     #[arg(long, value_enum, default_value = "resampled")]
@@ -364,9 +365,6 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     }
     if args.shutter > 0.0 && args.look() == Look::Classic {
         bail!("--shutter is for the traced look; the classic one draws a single frame");
-    }
-    if args.shutter > 0.0 && args.no_accumulation {
-        bail!("--shutter is a mean of frames; leave out --no-accumulation");
     }
     let settings = args.settings();
     let denoiser = args.denoise.filter(&settings)?;

@@ -165,7 +165,7 @@ settings! { variables {
     rt_illumination: bool = "rt_illumination", "1", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "0 shows surfaces in their own colour, without light.";
     rt_cull_lights: bool = "rt_cullLights", "1", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "0 samples among all lights of the map at every point instead of those that may reach it. Same picture, slower.";
     rt_num_random_dl: u32 = "rt_numRandomDL", "1", ARCHIVE, kept(0.0, 64.0), Frame, Restarts, "Lights picked at random for each pixel and frame, each with a shadow ray; 0 samples all that may reach the point.";
-    rt_samples: u32 = "rt_samples", "1", ARCHIVE, kept(1.0, 8.0), Frame, Restarts, "Samples of light in each frame, direct and bounced, for less noise: 2 take about twice the time of the light's passes.";
+    rt_samples: u32 = "rt_samples", "1", ARCHIVE, kept(1.0, 8.0), Frame, Restarts, "Samples of light in each frame, direct and bounced: more leave less noise and trace more rays.";
     rt_light_selection: LightSelection = "rt_lightSelection", "1", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "How a random light is picked: 0 uniformly, 1 resampled by importance. Same picture in the mean.";
     rt_candidates: u32 = "rt_candidates", "8", ARCHIVE, kept(1.0, 64.0), Frame, Restarts, "Lights looked at for each pick with rt_lightSelection 1.";
     rt_pause: bool = "rt_pause", "0", NONE, kept(0.0, 1.0), Frame, GoesOn, "1 keeps what the traced look shows still: view, entities and time. The game goes on.";

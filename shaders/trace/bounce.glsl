@@ -50,16 +50,16 @@ PathVertex first_vertex(LightTask task) {
 // Passes of a bounce: its rays, the surfaces that they meet, the rays to lights.
 const uint BOUNCE_RAYS = 0, BOUNCE_HITS = 1, BOUNCE_LIGHT = 2;
 
-// Starts the random numbers of one of these passes for a pixel and path (`round`); returns one for rounding.
-float bounce_random(LightTask task, uint bounce, uint pass, uint round) {
-    uint stream = STREAM_BOUNCE + STREAMS * (3 * bounce + pass) + STREAM_ROUND * round;
+// Starts the random numbers of one of these passes for a pixel and path (`path`); returns one for rounding.
+float bounce_random(LightTask task, uint bounce, uint pass, uint path) {
+    uint stream = STREAM_BOUNCE + STREAMS * (3 * bounce + pass) + STREAM_PATH * path;
     rng_begin(uvec2(task.pixel), subsample_index(task.seed), stream);
     return rng_independent();
 }
 
 // The same for `mirror_light.rgen`, in streams of their own.
-float mirror_random(LightTask task, uint bounce, uint round) {
-    rng_begin(uvec2(task.pixel), subsample_index(task.seed), STREAM_MIRRORS + STREAMS * bounce + STREAM_ROUND * round);
+float mirror_random(LightTask task, uint bounce, uint path) {
+    rng_begin(uvec2(task.pixel), subsample_index(task.seed), STREAM_MIRRORS + STREAMS * bounce + STREAM_PATH * path);
     return rng_independent();
 }
 

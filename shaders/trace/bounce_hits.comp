@@ -18,7 +18,7 @@ void main() {
     Hit hit = bounce_hit_read(cell, throughput, chain);
     bool onward = false;
     if (gathers(task)) {
-        random = bounce_random(task, push.number, BOUNCE_HITS, bounce_round());
+        random = bounce_random(task, push.number, BOUNCE_HITS, path_number());
         vec3 origin = vertex_origin(v);
         if (push.number > 0) origin = bounce_origin_read(cell, b.found);
         else if (VIEW.transport.mirror_count > 0) bounce_origin_read(cell, b.found);

@@ -14,8 +14,8 @@ ivec2 bounce_pixel(ivec2 cell) {
     return cell * CELL + ivec2(push.part & 1u, push.part >> 1u & 1u);
 }
 
-// Number of paths that the pixel has gathered by before this run.
-uint bounce_round() { return push.part >> 2; }
+// Number of the path, of those that the pixel traces in this frame.
+uint path_number() { return push.part >> 2; }
 
 bool is_last_bounce() { return push.number + 1 >= VIEW.transport.bounces; }
 
@@ -44,9 +44,9 @@ Hit bounce_hit_read(ivec2 cell, out vec3 throughput, out uint chain) {
     throughput = vec3(1.0);
     chain = CHAIN_NONE;
     if (has_throughput()) {
-        uvec4 path = texels.at[bounce_place(cell, 1)];
-        throughput = uintBitsToFloat(path.xyz);
-        chain = path.w;
+        uvec4 rest = texels.at[bounce_place(cell, 1)];
+        throughput = uintBitsToFloat(rest.xyz);
+        chain = rest.w;
     }
     return Hit(hit.x, hit.y, uintBitsToFloat(hit.zw), 0.0);
 }

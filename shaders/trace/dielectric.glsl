@@ -2,6 +2,8 @@
 #ifndef RELIGHT_TRACE_DIELECTRIC_GLSL
 #define RELIGHT_TRACE_DIELECTRIC_GLSL
 
+#include "trace/geometry.glsl"
+
 // Reflectance of a smooth surface for unpolarized light: Fresnel's equations for dielectrics. `cosine`: between ray and
 // normal; `eta`: index behind the surface over the index in front. 1: total reflection.
 float fresnel(float cosine, float eta) {
@@ -15,6 +17,19 @@ float fresnel(float cosine, float eta) {
 
 // Reflectance of a pane: the geometric series of reflections between its faces.
 float fresnel_pane(float one_face) { return 2.0 * one_face / (1.0 + one_face); }
+
+// Whether rays bend at the surface: of liquids and closed bodies of glass. Other glass is panes: the second face, usually
+// culled, reverses the refraction of the first, so rays pass straight.
+bool refracts(Material material, SurfacePoint p) {
+    return (material.flags & MATERIAL_LIQUID) != 0 || (p.triangle.flags & TRIANGLE_SOLID) != 0;
+}
+
+// Reflectance of glass or a liquid's surface; of both faces of a pane that shows one. `eta`: as for `fresnel`.
+float dielectric_reflectance(Material material, SurfacePoint p, float cosine, float eta) {
+    float one_face = fresnel(min(cosine, 1.0), eta);
+    bool pane = !refracts(material, p) && (material.flags & MATERIAL_TWO_SIDED) == 0;
+    return pane ? fresnel_pane(one_face) : one_face;
+}
 
 // The engine's gravity, units per second squared; gives the frequency of deep-water waves: frequency squared = gravity
 // times wave number.

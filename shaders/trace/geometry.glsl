@@ -108,6 +108,12 @@ vec3 shading_position(SurfacePoint p, vec3 face) {
     return p.position + moved * min(1.0, MAX_SHADING_OFFSET / max(offset, 1.0e-6));
 }
 
+// The mirror direction about a shading normal, or about the geometric normal `face` if that would lead into the surface.
+vec3 mirror_direction(vec3 direction, vec3 face, vec3 normal) {
+    vec3 mirrored = reflect(direction, normal);
+    return normalize(dot(mirrored, face) > 0.0 ? mirrored : reflect(direction, face));
+}
+
 // Start of a ray that leaves the surface on the side of `normal`: offset so that rounding cannot make it hit the
 // surface again (Wachter and Binder, A Fast and Robust Method for Avoiding Self-Intersection, scaled to coordinates).
 vec3 offset_ray(vec3 position, vec3 normal) {

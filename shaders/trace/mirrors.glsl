@@ -10,14 +10,12 @@
 // Weakest mirrored part that is followed.
 const float MIN_MIRRORED = 1.0 / 256.0;
 
-// The share of light that glass or the surface of a liquid mirrors. Bounced light and light of lamps pass both straight,
-// as they enter from outside, so there is no total reflection.
+// Reflectance of glass or a liquid's surface on paths of bounced light; 0 for other layers. These paths pass both
+// unrefracted, so both sides have the reflectance of the outer one, without total reflection.
 float layer_reflectance(SurfacePoint p, vec3 direction) {
     Material material = material_of(p.triangle.material);
     if (!(material.dielectric.index > 0.0)) return 0.0;
-    float mirrored = fresnel(min(abs(dot(p.face_normal, direction)), 1.0), material.dielectric.index);
-    bool pane = (material.flags & (MATERIAL_LIQUID | MATERIAL_TWO_SIDED)) == 0 && (p.triangle.flags & TRIANGLE_SOLID) == 0;
-    return pane ? fresnel_pane(mirrored) : mirrored;
+    return dielectric_reflectance(material, p, abs(dot(p.face_normal, direction)), material.dielectric.index);
 }
 
 // The part of light that the point mirrors, by its stages. With the diffuse part it is at most all light.
@@ -56,9 +54,7 @@ void mirror_ray(SurfacePoint p, vec3 face, vec3 normal, vec3 direction, out vec3
         }
     }
     if (mirror_of(p) < VIEW.transport.mirror_count) normal = face;
-    mirrored = reflect(direction, normal);
-    if (dot(mirrored, face) <= 0.0) mirrored = reflect(direction, face);
-    mirrored = normalize(mirrored);
+    mirrored = mirror_direction(direction, face, normal);
     origin = offset_ray(p.position, face);
 }
 

@@ -38,11 +38,10 @@ void redirect_path(inout Path path, SurfacePoint p, float t, vec3 normal, vec3 d
 // Continues the path mirrored. `face`: geometric normal on the path's side; `normal`: shading normal, distorted by
 // `bend` (`BENT_*`).
 void reflect_path(inout Path path, SurfacePoint p, float t, vec3 face, vec3 normal, uint bend) {
-    vec3 mirrored = reflect(path.direction, normal);
-    if (dot(mirrored, face) <= 0.0) mirrored = reflect(path.direction, face);
+    vec3 mirrored = mirror_direction(path.direction, face, normal);
     path.last = last_reflected(path.last, vec4(face, dot(face, p.position)));
     if (normal != face) path.bent = max(path.bent, bend);
-    redirect_path(path, p, t, face, normalize(mirrored));
+    redirect_path(path, p, t, face, mirrored);
     path.solid_mask |= MASK_SOLID | MASK_THIRD_SOLID;
     path.layer_mask = MASK_TRANSLUCENT | MASK_THIRD_TRANSLUCENT;
 }
@@ -100,13 +99,11 @@ struct Interface {
     bool enters;
 };
 
-// Liquids and closed bodies of glass refract. Other glass is panes: the second face, usually culled, reverses the
-// refraction of the first, so rays pass straight.
 Interface interface_at(Path path, SurfacePoint p, Material material, float width) {
     Dielectric dielectric = material.dielectric;
     Interface i;
     bool solid = (p.triangle.flags & TRIANGLE_SOLID) != 0;
-    i.refracts = solid || (material.flags & MATERIAL_LIQUID) != 0;
+    i.refracts = refracts(material, p);
     i.enters = dot(p.face_normal, path.direction) < 0.0;
     i.face = i.enters ? p.face_normal : -p.face_normal;
     vec3 smooth_normal = dot(p.normal, i.face) < 0.0 ? -p.normal : p.normal;
@@ -118,8 +115,7 @@ Interface interface_at(Path path, SurfacePoint p, Material material, float width
     }
     i.bend = dielectric.ripple > 0.0 ? BENT_BY_RIPPLES : BENT_BY_SHAPE;
     i.eta = !i.refracts || i.enters ? dielectric.index : 1.0 / dielectric.index;
-    i.mirrored = fresnel(min(cosine, 1.0), i.eta);
-    if (!i.refracts && (material.flags & MATERIAL_TWO_SIDED) == 0) i.mirrored = fresnel_pane(i.mirrored);
+    i.mirrored = dielectric_reflectance(material, p, cosine, i.eta);
     return i;
 }
 

@@ -1,12 +1,21 @@
 //! Bounced light: which passes gather it.
 
 use shaders::trace_types::TransportView;
+use shaders::trace_types::constants as t;
 
 use super::denoise;
 use super::frame_passes::FramePasses;
 use super::passes::Pass;
 use crate::gpu::Error;
-use crate::settings::{DenoiserChoice, Settings};
+use crate::settings::{DenoiserChoice, MOST_BOUNCES, Settings};
+
+// No stream of random numbers is used twice: those of three passes of each bounce, then those of light across mirrors, then
+// those of the pixel's next path.
+const _: () = {
+    assert!(t::STREAM_MIRRORS >= t::STREAM_BOUNCE + t::STREAMS * 3 * MOST_BOUNCES);
+    assert!((t::STREAM_MIRRORS - t::STREAM_BOUNCE).is_multiple_of(t::STREAMS));
+    assert!(t::STREAM_PATH >= t::STREAM_MIRRORS + t::STREAMS * MOST_BOUNCES);
+};
 
 /// Whether one of 2 × 2 pixels gathers bounced light: in a denoised picture the difference is invisible, and gathering
 /// is the most expensive pass. In reference mode and in undenoised pictures every pixel gathers.
@@ -14,8 +23,8 @@ pub fn is_subsampled(settings: &Settings) -> bool {
     denoise::in_use(settings) != DenoiserChoice::None && settings.rt_bounces > 0
 }
 
-/// Records the passes that gather bounced light, `samples` paths for each pixel that gathers. Where all pixels gather, the four of a cell take turns, so that the
-/// paths of a quarter of the pixels need memory.
+/// Records the passes that gather bounced light, by `samples` paths for each pixel that gathers. Where all pixels
+/// gather, the four of a cell take turns, so that the paths of a quarter of the pixels need memory.
 ///
 /// # Errors
 /// Out of memory, or the driver refuses a pipeline.
@@ -25,8 +34,8 @@ pub fn record(
     samples: u32,
 ) -> Result<(), Error> {
     let parts = if passes.facts.subsampled { 1 } else { 4 };
-    // the round is in the bits above those of the pixel
-    let runs = (0..samples).flat_map(|round| (0..parts).map(move |part| part | round << 2));
+    // the number of the path is in the bits above those of the pixel
+    let runs = (0..samples).flat_map(|path| (0..parts).map(move |part| part | path << 2));
     for part in runs {
         for bounce in 0..transport.bounces {
             if transport.mirror_count > 0 {

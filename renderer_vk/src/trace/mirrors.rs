@@ -9,24 +9,23 @@ use std::collections::HashMap;
 use glam::Vec3;
 use relight::light::{ClusterSet, Sight};
 use shaders::trace_types::MirrorPlane;
-use shaders::trace_types::constants::{MIRROR_TRANSLUCENT, MIRROR_TWO_SIDED, NO_MIRROR};
+use shaders::trace_types::constants::{
+    MASKED_MIRRORS as MASKED, MIRROR_TRANSLUCENT, MIRROR_TWO_SIDED, NO_MIRROR,
+};
 use shaders::types::Vertex;
 use shaders::types::constants as c;
 use support::Aabb;
 
 use super::input::{Kind, MaterialTable, StaticScene, StaticSurface};
+use super::light_tables::{Entry, probabilities};
 use crate::gpu::{Buffer, BufferUsage, Device, Error};
 
-/// Part of the probability that is distributed uniformly over the planes; the rest is distributed by area.
-const EVEN_PART: f64 = 0.1;
 /// Largest distance of a flat surface's vertices from its plane, units.
 const FLATNESS: f32 = 1.0 / 16.0;
 /// Least cosine of the vertex normals to the normal of a flat surface.
 const STRAIGHTNESS: f32 = 0.9999;
 /// Planes in live frames: the largest ones. Of many, a frame's samples would rarely choose the one that matters.
 const LIVE_PLANES: u32 = 16;
-/// Planes with a bit in the masks of clusters.
-const MASKED: u32 = u32::BITS;
 
 /// Flat mirrors of a map.
 #[derive(Default)]
@@ -34,7 +33,7 @@ pub struct Mirrors {
     buffers: Option<[Buffer; 2]>,
     count: u32,
     has_layers: bool,
-    /// Boxes around the surfaces of each of the first [`MASKED`] planes.
+    /// Boxes around the surfaces of each of the first `MASKED_MIRRORS` planes.
     boxes: Vec<Vec<Aabb>>,
     reach: Option<Buffer>,
     /// For each cluster, the planes that reflect light onto a cluster which it sees: bits as in `reach`.
@@ -298,14 +297,17 @@ fn surface_count(scene: &StaticScene<'_>) -> usize {
     scene.surfaces.iter().map(after).max().unwrap_or(0)
 }
 
-/// Sets the sums of probabilities.
+/// Sets the sums of probabilities, which follow the areas.
 fn accumulate(planes: &mut [MirrorPlane]) {
-    let total: f64 = planes.iter().map(|p| f64::from(p.area)).sum();
-    #[allow(clippy::cast_precision_loss)] // a number of planes
-    let even = 1.0 / planes.len().max(1) as f64;
+    let entry = |(plane, index): (&MirrorPlane, u32)| Entry {
+        light: index,
+        share: plane.area,
+        visibility: 1.0,
+    };
+    let entries: Vec<Entry> = planes.iter().zip(0..).map(entry).collect();
     let mut sum = 0.0;
-    for plane in planes {
-        sum += EVEN_PART * even + (1.0 - EVEN_PART) * f64::from(plane.area) / total;
+    for (plane, probability) in planes.iter_mut().zip(probabilities(&entries)) {
+        sum += probability;
         #[allow(clippy::cast_possible_truncation)] // rounds
         let until = sum as f32;
         plane.until = until;
@@ -411,9 +413,9 @@ mod tests {
         assert_eq!(found.planes[2].flags, MIRROR_TRANSLUCENT);
         assert!(found.has_layers);
         assert!((found.planes[2].until - 1.0).abs() < 1.0e-6);
-        let even = EVEN_PART as f32 / 3.0;
-        let first = even + (1.0 - EVEN_PART as f32) * 32.0 / 42.5;
-        assert!((found.planes[0].until - first).abs() < 1.0e-6);
+        // by area, but for a part that is shared evenly
+        let by_area = 32.0 / 42.5;
+        assert!(found.planes[0].until < by_area && found.planes[0].until > 0.9 * by_area);
     }
 
     #[test]

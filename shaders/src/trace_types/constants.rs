@@ -12,6 +12,9 @@ pub const KIND_PASSED: u32 = 4;
 /// `TransportView::mirror_of_surface`: the surface is no flat mirror, or is in no list.
 pub const NO_MIRROR: u32 = 0xFFFF_FFFF;
 
+/// Mirrors that have a bit in the masks of clusters: the largest ones.
+pub const MASKED_MIRRORS: u32 = 32;
+
 /// Bits of `MirrorPlane::flags`: some of its mirrors reflect on both sides.
 pub const MIRROR_TWO_SIDED: u32 = 1;
 /// They are glass or surfaces of liquids.
@@ -183,7 +186,7 @@ pub const STREAMS: u32 = 6;
 /// Light across mirrors of the first bounce: after the streams of three passes of 16 bounces.
 pub const STREAM_MIRRORS: u32 = 290;
 /// Distance between the streams of one path of a pixel and those of the next.
-pub const STREAM_ROUND: u32 = 4096;
+pub const STREAM_PATH: u32 = 4096;
 
 /// Streams of the denoiser's random numbers (`dither` in `denoise.glsl`): rounding of the fresh light; with
 /// `rt_denoiser 2` of the number of frames.

@@ -65,7 +65,7 @@ pub struct TransportView {
     pub mirrors: u64,
     /// For each surface of the map, the index of its [`MirrorPlane`], or `NO_MIRROR`.
     pub mirror_of_surface: u64,
-    /// For each cluster, a bit for each of the first 32 `mirrors` that light from there may come from.
+    /// For each cluster, a bit for each of the first `MASKED_MIRRORS` of `mirrors`: it may be visible from the cluster.
     pub mirror_reach: u64,
     /// Number of `filters`.
     pub filter_count: u32,

@@ -149,20 +149,21 @@ fn a_point_light_shows_the_outline_of_the_mirror(gpu: &mut Gpu) {
     assert!(lit > 8 && dark > 20, "{lit} {dark}");
 }
 
-fn the_sun_off_a_mirror_lights_the_shade(gpu: &mut Gpu) {
-    // the sun shines from below the horizon on a mirror over the floor, which has no sunlight of its own
-    let (image, grey) = grey_image(gpu, 200);
-    let mut scene = Scene::new(
-        Vec3::new(0.0, 0.0, 10.0),
-        Vec3::new(2.0, 0.0, 0.0),
-        20.0,
-        16,
-    );
+/// A small white floor below a large mirror: a sun below the horizon lights it by way of the mirror alone.
+fn sunless_floor(image: &Image) -> Scene {
+    let camera = Vec3::new(0.0, 0.0, 10.0);
+    let mut scene = Scene::new(camera, Vec3::new(2.0, 0.0, 0.0), 20.0, 16);
     let white = scene.diffuse(1.0);
     scene.quad(floor_at(0.0, 10.0), white);
     scene.images.push(image.texture_index());
     let mirror = scene.material(&[stage::constant([0.0; 3]), stage::shine(0)], 0);
     scene.quad(ceiling_at(15.0, 500.0), mirror);
+    scene
+}
+
+fn the_sun_off_a_mirror_lights_the_shade(gpu: &mut Gpu) {
+    let (image, grey) = grey_image(gpu, 200);
+    let mut scene = sunless_floor(&image);
     scene.sun(Vec3::new(-0.8, 0.0, -0.6), 5.0, 0.01);
     let exact = grey * 5.0 / PI * 0.6;
     for mean in by_each_way(gpu, &scene, &bounced(1), 64) {
@@ -206,19 +207,9 @@ fn curved_and_flat_mirrors_reflect_the_same_light(gpu: &mut Gpu) {
 }
 
 fn the_suns_disc_is_met_by_chance(gpu: &mut Gpu) {
-    // a mirror that light is not sampled across, below a wide sun
+    // no light is sampled across a curved mirror: rays have to hit the wide disc
     let (image, grey) = grey_image(gpu, 200);
-    let mut scene = Scene::new(
-        Vec3::new(0.0, 0.0, 10.0),
-        Vec3::new(2.0, 0.0, 0.0),
-        20.0,
-        16,
-    );
-    let white = scene.diffuse(1.0);
-    scene.quad(floor_at(0.0, 10.0), white);
-    scene.images.push(image.texture_index());
-    let mirror = scene.material(&[stage::constant([0.0; 3]), stage::shine(0)], 0);
-    scene.quad(ceiling_at(15.0, 500.0), mirror);
+    let mut scene = sunless_floor(&image);
     let sky = scene.sky(
         &[],
         SkyRecord {

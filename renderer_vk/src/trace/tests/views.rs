@@ -466,7 +466,7 @@ fn all_tracers_make_the_same_picture() {
 }
 
 fn an_open_shutter_takes_the_mean_of_what_passes(gpu: &mut Gpu) {
-    // the camera moves along a wall of stripes: each pixel is the mean of what passes it
+    // the camera moves along a wall of stripes: the blurred picture is the mean of the pictures at its eight places
     const FRAMES: u32 = 8;
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 40.0, 16);
     let [dark, bright] =
@@ -479,21 +479,20 @@ fn an_open_shutter_takes_the_mean_of_what_passes(gpu: &mut Gpu) {
     }
     let place = |frame: u32| Vec3::Y * (1.3 * frame as f32);
     let mut exact = vec![Vec3::ZERO; 256];
-    // a pixel's ray is at the same place in a frame alone as among others
-    let middles = Settings {
+    let without_taa = Settings {
         rt_taa: false,
         ..reference()
     };
     let mut sums = [0.0; 2];
     for frame in 0..FRAMES {
         scene.def.view_origin = place(frame);
-        let (pixels, _) = gpu.render(&scene, &middles, 16);
+        let (pixels, _) = gpu.render(&scene, &without_taa, 16);
         for (sum, pixel) in exact.iter_mut().zip(pixels) {
             *sum += pixel / FRAMES as f32;
         }
     }
     gpu.look.join_frames(16 * FRAMES);
-    let (blurred, _) = gpu.render_path(&scene, &middles, 16 * FRAMES, |frame, def| {
+    let (blurred, _) = gpu.render_path(&scene, &without_taa, 16 * FRAMES, |frame, def| {
         def.view_origin = place(frame / 16);
     });
     for (pixel, exact) in blurred.iter().zip(&exact) {
