@@ -455,19 +455,18 @@ impl Renderer {
     fn ready_to_trace(&mut self) -> Result<bool, Error> {
         if let (Some(world), Some(assets)) = (&mut self.world, &mut self.assets) {
             let settings = &self.settings;
-            let has_fog = !world.data.relit.bsp.fogs.is_empty();
             let lit = world.light_by(settings.rt_lights, assets, self.calibrations.as_ref());
             if lit || self.trace.is_none() {
                 let tracer = Tracer::of(self.device.info(), settings.rt_tracer);
                 let kept = self.trace_passes.take().filter(|p| p.tracer() == tracer);
                 let new = || Arc::new(PassSet::new(&self.device, tracer));
                 let passes = self.trace_passes.insert(kept.unwrap_or_else(new));
-                compile_ahead(passes, settings, has_fog)?;
                 self.trace = Some(TraceLook::new(passes, world, assets)?);
                 give_back_freed_memory();
-            } else if let Some(passes) = &self.trace_passes {
-                // the settings may have changed
-                compile_ahead(passes, settings, has_fog)?;
+            }
+            if let (Some(passes), Some(look)) = (&self.trace_passes, &self.trace) {
+                // in each frame, because settings and materials may have changed
+                compile_ahead(passes, settings, look.needs(world, assets))?;
             }
         }
         Ok(self.trace.is_some())

@@ -16,8 +16,8 @@ use crate::types::MaterialBuffers;
 
 pub use frames::{AntialiasView, DenoiseView, LastInstance, MotionView};
 pub use lights::{
-    BspNode, DynamicRow, LightBounds, LightRow, LightSlot, LightView, SphereLight, SunLight,
-    TriangleLight,
+    BspNode, DynamicRow, EmittedLight, LightBounds, LightRow, LightSlot, LightView, SphereLight,
+    SunLight, TriangleLight,
 };
 pub use structures::{BvhInstance, BvhNode, BvhTriangle, FilterStep, GeometryRecord, PassStep};
 pub use surroundings::{FlareView, FogView, MirrorPlane, PortalRecord, SkyRecord, TransportView};

@@ -117,6 +117,30 @@ pub struct Dielectric {
     pub absorption: Vec3,
 }
 
+/// Specular reflection of an opaque surface; all zero for materials without. Colours are linear.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Specular {
+    /// Perceptual roughness, 0 to 1: its square is the width alpha of the GGX distribution. Of `MATERIAL_ROUGH` alone.
+    pub roughness: f32,
+    /// Part of the surface that is metal, 0 to 1: its colour is that of the reflection, and it scatters nothing.
+    pub metal: f32,
+    /// Reflectance at normal incidence of the part that is no metal.
+    pub reflectance: f32,
+    /// `SPECULAR_MAP_*`: meaning of the channels of `map`.
+    pub map_kind: u32,
+    /// Bindless texture that varies the values above; `NO_TEXTURE`: none.
+    pub map: u32,
+    /// Bindless texture of normals in the tangent space of the texture coordinates. Of `MATERIAL_NORMALS` alone.
+    pub normals: u32,
+    /// Bindless sampler of both.
+    pub sampler_index: u32,
+    /// Factors of the normals' first two components.
+    pub normal_scale: Vec2,
+    /// Part of the light that the surface mirrors sharply, beside its stages.
+    pub mirror: Vec3,
+}
+
 /// A material: a run of stages, and properties for the tracer.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -140,8 +164,10 @@ pub struct Material {
     pub light_radiance: Vec3,
     /// Factor of the reflected light beside its stages (`q3map_lightmapBrightness`).
     pub lit_scale: f32,
-    /// Optical properties.
+    /// Optical properties of glass and liquids.
     pub dielectric: Dielectric,
+    /// Specular reflection.
+    pub specular: Specular,
 }
 
 /// One entity (or the world, index 0) of a view.

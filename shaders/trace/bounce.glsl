@@ -10,6 +10,7 @@
 #include "trace/fog.glsl"
 #include "trace/subsample.glsl"
 #include "trace/mirrors.glsl"
+#include "trace/specular_lights.glsl"
 
 // 1: the map has fog. 0 removes the code of fog.
 layout(constant_id = 1) const uint HAS_FOG = 0;
@@ -28,8 +29,13 @@ const float BOUNCE_SPREAD = 0.1;
 // How a ray of a path starts, which decides who samples the lights that it meets. CHAIN_NONE: at a diffuse vertex, where
 // `one_light` samples them. CHAIN_SAMPLED: at a flat mirror that a ray from a diffuse vertex has met; `mirror_light.rgen`
 // samples the lights that lie behind it. CHAIN_UNSAMPLED: at another mirror or at a portal; no pass samples lights
-// there, so that their emission counts where the ray hits it.
-const uint CHAIN_NONE = 0, CHAIN_SAMPLED = 1, CHAIN_UNSAMPLED = 2;
+// there, so that their emission counts where the ray hits it. CHAIN_ROUGH: at a rough surface; samples of lights and rays
+// share what rays can meet (multiple importance sampling, power heuristic; Veach, Robust Monte Carlo Methods, section
+// 9.2.4), by the density of the ray, which the upper bits hold.
+const uint CHAIN_NONE = 0, CHAIN_SAMPLED = 1, CHAIN_UNSAMPLED = 2, CHAIN_ROUGH = 3, CHAIN_BITS = 3;
+
+uint rough_chain(float density) { return floatBitsToUint(density) & ~CHAIN_BITS | CHAIN_ROUGH; }
+float chain_density(uint chain) { return uintBitsToFloat(chain & ~CHAIN_BITS); }
 
 // The vertex of a path from which the next ray starts.
 struct PathVertex {
@@ -37,14 +43,13 @@ struct PathVertex {
     vec3 face_normal; // on the side that the path comes from
     vec3 normal; // diffuse vertices only
     uint chain; // CHAIN_*
-    vec3 direction; // of the next ray; mirrored vertices only
+    vec3 direction; // of the next ray; not of diffuse vertices
+    Gloss gloss; // of rough vertices
+    vec3 to_viewer; // of rough vertices: back along the path
 };
 
-// Whether a pixel gathers bounced light.
-bool gathers(LightTask task) { return task.surface.view_distance >= 0.0 && (VIEW.flags & VIEW_FULLBRIGHT) == 0; }
-
 PathVertex first_vertex(LightTask task) {
-    return PathVertex(task.surface.position, task.surface.face_normal, task.surface.normal, CHAIN_NONE, vec3(0.0));
+    return PathVertex(task.surface.position, task.surface.face_normal, task.surface.normal, CHAIN_NONE, vec3(0.0), NO_GLOSS, vec3(0.0));
 }
 
 // Passes of a bounce: its rays, the surfaces that they meet, the rays to lights.
@@ -60,6 +65,12 @@ float bounce_random(LightTask task, uint bounce, uint pass, uint path) {
 // The same for `mirror_light.rgen`, in streams of their own.
 float mirror_random(LightTask task, uint bounce, uint path) {
     rng_begin(uvec2(task.pixel), subsample_index(task.seed), STREAM_MIRRORS + STREAMS * bounce + STREAM_PATH * path);
+    return rng_independent();
+}
+
+// The same for `specular_light.rgen`.
+float specular_random(LightTask task, uint path) {
+    rng_begin(uvec2(task.pixel), subsample_index(task.seed), STREAM_SPECULAR + STREAM_PATH * path);
     return rng_independent();
 }
 
@@ -95,21 +106,46 @@ vec3 bounded_light(vec3 light) {
     return light * min(MOST_LIVE_LIGHT * exp2(-VIEW.exposure.base) / max(max_component(light), 1.0e-20), 1.0);
 }
 
-// Radiance of a surface as a light of the lists.
-vec3 listed_radiance(SurfacePoint p) {
+// Radiance of a surface as a light of the lists, as far as the ray counts it. `away`: its distance.
+vec3 listed_radiance(SurfacePoint p, vec3 direction, float away, uint chain) {
     bool known = (p.triangle.flags & TRIANGLE_STATIC) != 0 && p.triangle.instance < VIEW.lights.emitted_count;
-    return known ? Positions(VIEW.lights.emitted).at[p.triangle.instance] * VIEW.lights.scale : vec3(0.0);
+    if (!known) return vec3(0.0);
+    EmittedLight light = EmittedLights(VIEW.lights.emitted).at[p.triangle.instance];
+    vec3 radiance = light.radiance * VIEW.lights.scale;
+    if ((chain & CHAIN_BITS) != CHAIN_ROUGH) return radiance;
+    if (light.met == 0) return vec3(0.0);
+    return radiance * ray_share(chain_density(chain), triangle_density(away, abs(dot(p.face_normal, direction)), triangle_area(p)));
 }
 
-// Radiance of the suns in a direction.
-vec3 sun_radiance(vec3 direction) {
+// Radiance of the suns in a direction, as far as the ray counts it.
+vec3 sun_radiance(vec3 direction, uint chain) {
     vec3 sum = vec3(0.0);
     for (uint i = 0; i < VIEW.lights.sun_count; i++) {
         SunLight sun = SunLights(VIEW.lights.suns).at[i];
-        if (sun.cos_angle < 1.0 && dot(direction, sun.direction) >= sun.cos_angle)
-            sum += sun.irradiance * (VIEW.lights.scale / (2.0 * (1.0 - sun.cos_angle)));
+        if (!(sun.cos_angle < 1.0 && dot(direction, sun.direction) >= sun.cos_angle)) continue;
+        float share = 1.0;
+        if ((chain & CHAIN_BITS) == CHAIN_ROUGH) share = ray_share(chain_density(chain), sun_density(sun));
+        sum += sun.irradiance * (VIEW.lights.scale * share / (2.0 * (1.0 - sun.cos_angle)));
     }
     return sum;
+}
+
+// The part of a light sample that a rough vertex reflects along the path. `both`: a ray by the surface's distribution
+// follows, and counts its share.
+LightSample rough_light(PathVertex v, bool both) {
+    LightSet set = lights_at(v.position, v.face_normal, v.normal);
+    vec2 u;
+    LightChoice choice = one_choice(set, v.position, v.normal, u);
+    if (!(choice.weight > 0.0)) return no_light();
+    LightSample s = sample_light(choice.light, v.position, v.normal, u);
+    if (!(max_component(s.light) > 0.0) || dot(s.direction, v.face_normal) <= 0.0) return no_light();
+    GlossView view = gloss_view(v.normal, v.to_viewer);
+    float density = gloss_density(v.gloss, view, s.direction);
+    // L of the sample has the cosine and pi
+    s.light *= choice.weight * PI / max(dot(v.normal, s.direction), 1.0e-6);
+    s.light *= gloss_weight(v.gloss, view, s.direction) * density;
+    if (both) s.light *= 1.0 - ray_share_of(choice.light, v.position, s.direction, density);
+    return s;
 }
 
 // Decides whether a path goes on mirrored, by the brightest channel of both parts, and divides its throughput by the
@@ -129,6 +165,29 @@ bool chooses_mirror(SurfacePoint p, vec3 direction, Layer layer, inout vec3 thro
     return chosen;
 }
 
+// Smallest width of the distribution at the last vertex of a path, where no ray follows that could meet lights: a sharper
+// lobe would find them in few, bright samples.
+const float LEAST_LAST_ALPHA = 0.04;
+
+// Decides whether a path goes on by the specular part of a rough surface, and divides its throughput by the probability.
+bool chooses_gloss(vec3 shine, vec3 lit, inout vec3 throughput) {
+    float specular = max_component(throughput * shine), diffuse = max_component(throughput * lit);
+    float chance = specular / max(specular + diffuse, 1.0e-20);
+    bool chosen = rng_next() < chance;
+    throughput /= chosen ? max(chance, 1.0e-20) : 1.0 - chance;
+    return chosen;
+}
+
+// Samples the next ray of a rough vertex; false: it leads into the surface.
+bool rough_direction(inout PathVertex v, inout vec3 throughput) {
+    GlossView view = gloss_view(v.normal, v.to_viewer);
+    v.direction = gloss_direction(v.gloss, view, rng_next2());
+    throughput *= gloss_weight(v.gloss, view, v.direction);
+    v.chain = rough_chain(gloss_density(v.gloss, view, v.direction));
+    v.position = offset_ray(v.position, v.face_normal);
+    return dot(v.direction, v.face_normal) > 0.0 && max_component(throughput) > 0.0;
+}
+
 // Shades the hit of a bounce ray: adds emission to `sum`, and moves the vertex to the hit. `chain`: how the ray started.
 // Returns whether the path goes on or takes a light sample at the vertex.
 bool bounce_shade(Hit hit, vec3 origin, uint chain, inout vec3 throughput, inout vec3 sum, out PathVertex v) {
@@ -143,26 +202,41 @@ bool bounce_shade(Hit hit, vec3 origin, uint chain, inout vec3 throughput, inout
     }
     if (!shows_face(p, direction)) return false;
     // passes that sample the lists have counted their lights
-    bool in_lists = (material_of(p.triangle.material).flags & MATERIAL_EMITTER) != 0;
-    if (in_lists && chain == CHAIN_UNSAMPLED) sum += bounded_light(throughput * listed_radiance(p));
+    Material material = material_of(p.triangle.material);
+    bool in_lists = (material.flags & MATERIAL_EMITTER) != 0, counts = (chain & CHAIN_BITS) >= CHAIN_UNSAMPLED;
+    if (in_lists && counts) sum += bounded_light(throughput * listed_radiance(p, direction, t, chain));
     if (p.kind == KIND_SKY) {
         if (!in_lists) sum += throughput * sky_radiance(p, direction, BOUNCE_SPREAD, false, vec4(0.0));
-        if (chain == CHAIN_UNSAMPLED) sum += bounded_light(throughput * sun_radiance(direction));
+        if (counts) sum += bounded_light(throughput * sun_radiance(direction, chain));
         return false;
     }
-    Layer layer = evaluate_stages(p, round_footprint(t * BOUNCE_SPREAD));
+    Footprint seen = round_footprint(t * BOUNCE_SPREAD);
+    Layer layer = evaluate_stages(p, seen);
+    p.normal = mapped_normal(p, material, seen);
+    vec3 shine;
+    Gloss gloss = take_gloss(p, material, seen, direction, layer.lit, shine);
     if (!in_lists && p.kind != KIND_TRANSLUCENT) sum += throughput * max(layer.emission, 0.0);
     v.face_normal = dot(p.face_normal, direction) > 0.0 ? -p.face_normal : p.face_normal;
     v.normal = dot(p.normal, v.face_normal) < 0.0 ? -p.normal : p.normal;
     v.chain = CHAIN_NONE;
+    v.to_viewer = -direction;
+    v.gloss = NO_GLOSS;
     if (LAST_BOUNCE == 0 && chooses_mirror(p, direction, layer, throughput)) {
         v.chain = chain == CHAIN_NONE && is_sampled_mirror(p) ? CHAIN_SAMPLED : CHAIN_UNSAMPLED;
         mirror_ray(p, v.face_normal, v.normal, direction, v.position, v.direction);
         return true;
     }
     if (p.kind == KIND_TRANSLUCENT) return false;
-    throughput *= clamp(layer.lit, 0.0, 1.0);
     v.position = shading_position(p, v.face_normal);
+    vec3 lit = clamp(layer.lit, 0.0, 1.0);
+    if ((VIEW.flags & VIEW_ACCUMULATE) == 0) lit = min(lit + shine, 1.0); // live frames have one lobe behind the first surface
+    else if (is_glossy(gloss) && chooses_gloss(shine, lit, throughput)) {
+        v.chain = CHAIN_ROUGH;
+        v.gloss = gloss;
+        if (LAST_BOUNCE != 0) v.gloss.alpha = max(gloss.alpha, LEAST_LAST_ALPHA);
+        return true;
+    }
+    throughput *= lit;
     return max_component(throughput) > 0.0;
 }
 

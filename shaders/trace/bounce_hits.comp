@@ -9,7 +9,7 @@ void main() {
     if (any(greaterThanEqual(cell, bounce_cells()))) return;
     ivec2 pixel = bounce_pixel(cell);
     if (any(greaterThanEqual(pixel, ivec2(VIEW.width, VIEW.height)))) return;
-    LightTask task = light_task(pixel);
+    LightTask task = bounce_task(pixel);
     BounceLight b = BounceLight(vec3(0.0), no_light(), vec3(0.0));
     PathVertex v = first_vertex(task);
     float random = 0.5;
@@ -18,15 +18,19 @@ void main() {
     Hit hit = bounce_hit_read(cell, throughput, chain);
     bool onward = false;
     if (gathers(task)) {
-        random = bounce_random(task, push.number, BOUNCE_HITS, path_number());
+        random = bounce_random(task, push.number, BOUNCE_HITS, path_stream());
         vec3 origin = vertex_origin(v);
         if (push.number > 0) origin = bounce_origin_read(cell, b.found);
-        else if (VIEW.transport.mirror_count > 0) bounce_origin_read(cell, b.found);
+        else if (is_specular() || VIEW.transport.mirror_count > 0) bounce_origin_read(cell, b.found);
         onward = hit.geometry != NO_HIT && bounce_shade(hit, origin, chain, throughput, b.found, v);
         if (onward) {
             if (v.chain == CHAIN_NONE) {
                 b.light = vertex_light(v);
                 b.light.light *= throughput;
+            } else if (v.chain == CHAIN_ROUGH) {
+                b.light = rough_light(v, LAST_BOUNCE == 0);
+                b.light.light *= throughput;
+                onward = rough_direction(v, throughput);
             }
             b.origin = vertex_origin(v);
         }

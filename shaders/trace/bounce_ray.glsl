@@ -5,6 +5,7 @@
 
 #include "trace/bounce.glsl"
 #include "trace/light_ray.glsl"
+#include "trace/specular_surface.glsl"
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer BounceTexels { uvec4 at[]; };
 
@@ -14,10 +15,47 @@ ivec2 bounce_pixel(ivec2 cell) {
     return cell * CELL + ivec2(push.part & 1u, push.part >> 1u & 1u);
 }
 
-// Number of the path, of those that the pixel traces in this frame.
-uint path_number() { return push.part >> 2; }
+// Whether the path gathers specular light of the pixel's surface; otherwise diffuse light.
+bool is_specular() { return (push.part & PART_SPECULAR) != 0; }
 
-bool is_last_bounce() { return push.number + 1 >= VIEW.transport.bounces; }
+// Number of the path, of those that the pixel traces in this frame for this light.
+uint path_number() { return (push.part & ~PART_SPECULAR) >> PART_PATH_SHIFT; }
+
+// Number of the path for its random numbers.
+uint path_stream() { return path_number() + (is_specular() ? SPECULAR_PATHS : 0); }
+
+uint bounce_count() { return is_specular() ? VIEW.transport.specular_bounces : VIEW.transport.bounces; }
+
+bool is_last_bounce() { return push.number + 1 >= bounce_count(); }
+
+// The surface from which the path starts. Specular light has no gradient samples.
+LightTask bounce_task(ivec2 pixel) {
+    return is_specular() ? LightTask(gbuffer_read(pixel), pixel, VIEW.seed) : light_task(pixel);
+}
+
+// Whether a path starts at the surface; `gloss`: its specular reflection, for specular light.
+bool gathers(LightTask task, out GlossPixel gloss) {
+    gloss = GlossPixel(NO_GLOSS, vec3(0.0), vec3(0.0, 0.0, 1.0));
+    if (task.surface.view_distance < 0.0 || (VIEW.flags & VIEW_FULLBRIGHT) != 0) return false;
+    if (!is_specular()) return true;
+    gloss = gloss_read(task.pixel);
+    return is_glossy(gloss.gloss);
+}
+
+// Makes the first vertex of a specular path from a pixel's surface; its throughput is relative to the specular albedo.
+PathVertex rough_vertex(LightTask task, GlossPixel gloss, out vec3 throughput) {
+    PathVertex v = first_vertex(task);
+    v.chain = CHAIN_ROUGH;
+    v.gloss = gloss.gloss;
+    v.to_viewer = gloss.to_viewer;
+    throughput = 1.0 / max(specular_albedo(v.gloss, gloss_view(v.normal, v.to_viewer).cosine), 1.0e-4);
+    return v;
+}
+
+bool gathers(LightTask task) {
+    GlossPixel gloss;
+    return gathers(task, gloss);
+}
 
 ivec2 bounce_cells() { return (ivec2(VIEW.width, VIEW.height) + CELL - 1) / CELL; }
 
@@ -28,7 +66,7 @@ uint bounce_place(ivec2 cell, uint part) {
 }
 
 // Whether paths have a throughput other than 1 before the surface that a ray meets.
-bool has_throughput() { return VIEW.transport.filter_count != 0 || VIEW.transport.bounces > 1; }
+bool has_throughput() { return VIEW.transport.filter_count != 0 || VIEW.transport.bounces > 1 || is_specular(); }
 
 // Writes the hit of a bounce ray, and the throughput of the path before the hit surface. `chain`: how the ray started.
 void bounce_hit_write(ivec2 cell, Hit hit, vec3 throughput, uint chain) {
@@ -65,7 +103,7 @@ PathVertex bounce_vertex_read(ivec2 cell, out vec3 throughput) {
     BounceTexels texels = BounceTexels(VIEW.scratch);
     uvec4 directions = texels.at[bounce_place(cell, 0)], path = texels.at[bounce_place(cell, 1)];
     throughput = uintBitsToFloat(path.xyz);
-    return PathVertex(vec3(0.0), unpack_normal(directions.x), unpack_normal(directions.y), path.w, unpack_direction(directions.zw));
+    return PathVertex(vec3(0.0), unpack_normal(directions.x), unpack_normal(directions.y), path.w, unpack_direction(directions.zw), NO_GLOSS, vec3(0.0));
 }
 
 // A shadow ray to a light, which starts where the next bounce does, and the radiance found before it.

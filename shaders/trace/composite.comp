@@ -5,6 +5,7 @@
 // neighbours.
 #include "trace/denoise.glsl"
 #include "trace/motion.glsl"
+#include "trace/specular_surface.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -47,6 +48,7 @@ Shown shown(ivec2 pixel) {
     s.is_lit = is_lit_read(pixel);
     s.albedo = g.albedo;
     s.light = s.is_lit ? light_of(pixel) : vec3(0.0);
+    s.front += shown_gloss(pixel);
     return s;
 }
 

@@ -36,6 +36,15 @@ vec3 safe_normalize(vec3 v, vec3 otherwise) {
     return squared > 1.0e-30 ? v * inversesqrt(squared) : otherwise;
 }
 
+// Two unit vectors perpendicular to n (Duff et al., Building an Orthonormal Basis, Revisited, 2017).
+void basis(vec3 n, out vec3 t, out vec3 b) {
+    float s = n.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (s + n.z);
+    float c = n.x * n.y * a;
+    t = vec3(1.0 + s * n.x * n.x * a, s * c, -s * n.x);
+    b = vec3(c, s + n.y * n.y * a, -n.y);
+}
+
 SurfacePoint surface_point(Hit hit) {
     GeometryRecord record = Geometries(VIEW.scene.geometries).at[hit.geometry];
     SurfacePoint p;

@@ -292,12 +292,21 @@ vec3 bounded_albedo(Material material, vec3 lit) {
     return material.lit_scale != 1.0 ? min(lit * material.lit_scale, max(lit, 1.0)) : lit;
 }
 
+// Gives the sharply mirrored part of the light, which a file of materials states, from the diffuse to the mirrored part.
+void take_mirror(Material material, inout Layer layer) {
+    if ((material.flags & MATERIAL_REFLECTS) == 0 || material.specular.mirror == vec3(0.0) || (VIEW.flags & VIEW_FULLBRIGHT) != 0) return;
+    layer.lit *= 1.0 - material.specular.mirror;
+    layer.reflected = max(layer.reflected, material.specular.mirror);
+}
+
 // Parts of the point's stages on a path of bounced light, each by itself in linear light.
 Layer evaluate_stages(SurfacePoint p, Footprint footprint) {
     Material material = material_of(p.triangle.material);
     Layer shown = run_stages(material, p, footprint, SEEN_BOUNCED);
-    return Layer(bounded_albedo(material, linear_part(shown.lit)), linear_part(shown.emission), linear_part(shown.through),
+    Layer layer = Layer(bounded_albedo(material, linear_part(shown.lit)), linear_part(shown.emission), linear_part(shown.through),
         linear_part(shown.reflected), vec3(0.0));
+    take_mirror(material, layer);
+    return layer;
 }
 
 // Emission that an emitter displays: its texture at up to full brightness.

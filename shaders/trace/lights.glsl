@@ -143,15 +143,6 @@ vec3 sample_spherical_triangle(vec3 a, vec3 b, vec3 c, float omega, vec2 u) {
 // Below this solid angle a triangle is sampled by area: the spherical formulas lose precision there.
 const float MIN_SOLID_ANGLE = 2.0e-3;
 
-// Two unit vectors perpendicular to n (Duff et al., Building an Orthonormal Basis, Revisited, 2017).
-void basis(vec3 n, out vec3 t, out vec3 b) {
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float c = n.x * n.y * a;
-    t = vec3(1.0 + s * n.x * n.x * a, s * c, -s * n.x);
-    b = vec3(c, s + n.y * n.y * a, -n.y);
-}
-
 // A direction in the cone around `axis` with the given cosine of its half angle, uniform in solid angle.
 vec3 sample_cone(vec3 axis, float cos_angle, vec2 u) {
     vec3 t, b;
@@ -488,13 +479,19 @@ LightChoice sample_one(LightSet set, vec3 position, vec3 normal, inout float u) 
     return LightChoice(listed.light, listed.weight / (1.0 - chance), listed.total);
 }
 
-// Selects one light of a set, and a point on it, for a surface point.
+// Selects one light of a set for a surface point. `u`: samples a point on it.
+LightChoice one_choice(LightSet set, vec3 position, vec3 normal, out vec2 u) {
+    u = vec2(0.0);
+    if (set_count(set) == 0) return LightChoice(0, 0.0, 0.0);
+    u = rng_next2();
+    if (VIEW.lights.selection == SELECT_UNIFORM) return sample_uniform(whole_set(set), u.x);
+    return sample_one(set, position, normal, u.x);
+}
+
+// The same, and a point on it.
 LightSample one_light(LightSet set, vec3 position, vec3 normal) {
-    if (set_count(set) == 0) return no_light();
-    vec2 u = rng_next2();
-    LightChoice choice;
-    if (VIEW.lights.selection == SELECT_UNIFORM) choice = sample_uniform(whole_set(set), u.x);
-    else choice = sample_one(set, position, normal, u.x);
+    vec2 u;
+    LightChoice choice = one_choice(set, position, normal, u);
     if (!(choice.weight > 0.0)) return no_light();
     LightSample s = sample_light(choice.light, position, normal, u);
     s.light *= choice.weight;

@@ -1,10 +1,11 @@
 // The path of a primary ray through a pixel: its accumulated radiance, and the lit point that the pixel shows.
 #ifndef RELIGHT_TRACE_PATH_GLSL
 #define RELIGHT_TRACE_PATH_GLSL
-#include "trace/layer.glsl"
+#include "trace/specular.glsl"
 #include "trace/sky.glsl"
 #include "trace/random.glsl"
 #include "trace/gbuffer.glsl"
+#include "trace/specular_surface.glsl"
 #include "trace/camera.glsl"
 #include "trace/motion.glsl"
 
@@ -50,6 +51,7 @@ struct Path {
 // proportional to its contribution, and weighted by the reciprocal (reservoir sampling), so that the mean over frames
 // is their sum.
 GBufferPixel kept;
+GlossPixel kept_gloss;
 float kept_weight;
 float weight_sum;
 LastPlace kept_last;
@@ -76,9 +78,20 @@ LastSpace last_space(Path path, vec3 position, float t) {
     return LastSpace(path.last.linear, VIEW.camera.origin + path.view_direction * (path.travelled + t) - path.last.linear * position);
 }
 
-// `last`: the point's position in the last frame.
-void keep_lit(SurfacePoint p, vec3 lit, Path path, LastPlace last, float t) {
-    float weight = max_component(lit);
+// Contribution of a surface to a path: its parts in linear light; the displayed part of the background that it
+// transmits (`cover`); and the emission of lights and added light of models, shown by the texture (`own`).
+struct SeenLayer {
+    Layer linear;
+    vec3 cover;
+    vec3 own;
+    float clear; // part of its light that fog leaves
+    Gloss gloss;
+    vec3 shine; // specular albedo
+};
+
+// `last`: the point's position in the last frame; `shine`: the part of the light around that the gloss shows.
+void keep_lit(SurfacePoint p, vec3 lit, vec3 shine, SeenLayer layer, Path path, LastPlace last, float t) {
+    float weight = max_component(lit + shine);
     if (!(weight > 0.0)) return;
     if (abs(dot(lit_plane.xyz, p.face_normal)) > 0.99 && abs(dot(lit_plane.xyz, p.position) - lit_plane.w) < PAINT_DISTANCE) {
         if (lit_kept) kept.albedo += lit;
@@ -97,6 +110,7 @@ void keep_lit(SurfacePoint p, vec3 lit, Path path, LastPlace last, float t) {
     // the side that the path hits is lit
     kept.normal = dot(p.normal, kept.face_normal) < 0.0 ? -p.normal : p.normal;
     kept.albedo = lit;
+    kept_gloss = GlossPixel(layer.gloss, shine, -path.direction);
     kept.first_person = (instance_of(p.instance).flags & INSTANCE_FIRST_PERSON) != 0;
     kept_last = last;
     kept_bent = path.bent;
@@ -128,18 +142,9 @@ float moved_glow(vec4 motion, vec3 front, vec3 shown) {
     return away * clamp(max_component(added) / max(MOST_FRESH * max_component(front), 1.0e-6), 0.0, 0.99);
 }
 
-// Contribution of a surface to a path: its parts in linear light; the displayed part of the background that it
-// transmits (`cover`); and the emission of lights and added light of models, shown by the texture (`own`).
-struct SeenLayer {
-    Layer linear;
-    vec3 cover;
-    vec3 own;
-    float clear; // part of its light that fog leaves
-};
-
 // `mirrors`: whether rays follow the reflection; otherwise environment images replace it. `clear`: displayed part of
 // the layer that fog leaves.
-SeenLayer seen_layer(SurfacePoint p, Material material, Footprint seen, bool mirrors, float clear) {
+SeenLayer seen_layer(SurfacePoint p, Material material, Footprint seen, vec3 direction, bool mirrors, float clear) {
     Layer shown = run_stages(material, p, seen, mirrors ? SEEN_FOLLOWED : SEEN_LAST);
     if (clear < 1.0) {
         shown.lit *= clear;
@@ -149,9 +154,13 @@ SeenLayer seen_layer(SurfacePoint p, Material material, Footprint seen, bool mir
         shown.through = mix(vec3(1.0), shown.through, clear);
     }
     Layer part = Layer(bounded_albedo(material, linear_part(shown.lit)), vec3(0.0), linear_part(shown.through), linear_part(shown.reflected), vec3(0.0));
+    vec3 own = part.lit * (shown_glow(material) + added_light(p));
+    take_mirror(material, part);
+    vec3 shine;
+    Gloss gloss = take_gloss(p, material, seen, direction, part.lit, shine);
     if (max_component(part.reflected) < MIN_REFLECTION) part.reflected = vec3(0.0);
     part.emission = linear_part(shown.emission + shown.haze);
-    return SeenLayer(part, max(shown.through, 0.0), part.lit * (shown_glow(material) + added_light(p)), linear_part(vec3(clear)).x);
+    return SeenLayer(part, max(shown.through, 0.0), own, linear_part(vec3(clear)).x, gloss, shine);
 }
 
 // Bound of the gain of traced light on layers where the engine shows hardly any light: their share of the displayed sum
@@ -184,8 +193,8 @@ vec3 light_shown(SurfacePoint p) {
 
 void add_layer(inout Path path, SurfacePoint p, SeenLayer layer, LastPlace last, float t) {
     vec3 lit = path.transmittance * layer.linear.lit, own = path.transmittance * layer.own;
-    vec3 glow = path.transmittance * layer.linear.emission;
-    bool glows = glow != vec3(0.0), is_lit = lit != vec3(0.0);
+    vec3 glow = path.transmittance * layer.linear.emission, shine = path.transmittance * layer.shine;
+    bool glows = glow != vec3(0.0), is_lit = lit + shine != vec3(0.0);
     bool alone = path.cover == vec3(1.0) && path.shown == vec3(0.0) && layer.cover == vec3(0.0) && !(glows && is_lit);
     vec3 gain = vec3(1.0);
     if (alone) {
@@ -193,12 +202,12 @@ void add_layer(inout Path path, SurfacePoint p, SeenLayer layer, LastPlace last,
     } else {
         if (glows) path.glow += path.weight * glow * share_display(path, encode_display(glow));
         if (is_lit) {
-            vec3 share = share_display(path, encode_display(lit * light_shown(p) + own));
+            vec3 share = share_display(path, encode_display((lit + shine) * light_shown(p) + own));
             path.glow += path.weight * own * share;
             gain = min(share, path.cover * MOST_GAIN / display_slope(path.shown));
         }
     }
-    keep_lit(p, path.weight * lit * gain, path, last, t);
+    keep_lit(p, path.weight * lit * gain, path.weight * shine * gain, layer, path, last, t);
     path.cover *= layer.cover;
     path.events++;
 }

@@ -1,6 +1,6 @@
 //! A registered material: a script's definition bound to images, in the form that the passes read.
 
-use shaders::types::Dielectric;
+use shaders::types::{Dielectric, Specular};
 use shaderscript::{AlphaGen, Cull, Deform, Fog, Shader, TcGen};
 
 /// `surfaceparm nodlight` and `surfaceparm sky`: surfaces without dynamic lights.
@@ -104,6 +104,8 @@ pub struct Material {
     pub flags: u32,
     /// Transmission for rays.
     pub dielectric: Dielectric,
+    /// Specular reflection for rays.
+    pub specular: Specular,
     /// Which faces are drawn.
     pub cull: Cull,
     /// Drawn with a depth offset towards the camera.

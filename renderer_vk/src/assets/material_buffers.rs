@@ -108,6 +108,10 @@ impl Materials {
             light_radiance: light,
             lit_scale: lit_scale(material),
             dielectric: material.dielectric,
+            specular: types::Specular {
+                sampler_index: samplers.index(material.specular.sampler_index),
+                ..material.specular
+            },
         }
     }
 

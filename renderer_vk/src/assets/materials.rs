@@ -358,6 +358,7 @@ impl Materials {
             order,
             flags: flags::material_flags(&shader, class) | dielectric::mirrors(&dielectric),
             dielectric,
+            specular: types::Specular::default(),
             cull: shader.cull,
             polygon_offset: shader.polygon_offset,
             passes: passes(&shader, stage_first),
@@ -558,6 +559,12 @@ impl Materials {
     fn touch(&mut self) {
         self.dirty = true;
         self.generation += 1;
+    }
+
+    /// Whether a material reflects by its roughness.
+    pub fn has_gloss(&self) -> bool {
+        let rough = types::constants::MATERIAL_ROUGH;
+        self.list.iter().any(|material| material.flags & rough != 0)
     }
 
     /// A number that grows whenever a material is added or changed.

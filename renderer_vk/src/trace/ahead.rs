@@ -9,7 +9,7 @@ use crate::settings::{DenoiserChoice, Settings};
 
 /// Passes that the settings decide about, or that every frame runs, the slowest to compile first. Others are
 /// compiled when a frame first runs them.
-const AHEAD: [Pass; 30] = [
+const AHEAD: [Pass; 31] = [
     Pass::Primary,
     Pass::BounceShadeLast,
     Pass::BounceShade,
@@ -21,6 +21,7 @@ const AHEAD: [Pass; 30] = [
     Pass::BounceLight,
     Pass::BounceRays,
     Pass::MirrorLight,
+    Pass::SpecularLight,
     Pass::PrimaryRays,
     Pass::SampleLights,
     Pass::WaveletFirst,
@@ -71,22 +72,57 @@ fn is_chosen(pass: Pass, settings: &Settings) -> bool {
     }
 }
 
-/// Compiles what frames with these settings run and `passes` lacks. `has_fog`: the map has fog.
+/// Facts about a map that decide which passes its frames run.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MapNeeds {
+    /// It has fog.
+    pub fog: bool,
+    /// It has flat mirrors.
+    pub mirrors: bool,
+    /// Materials reflect by their roughness.
+    pub gloss: bool,
+}
+
+/// The states of a pass's switches that occur, one bit for each switch.
+fn states(pass: Pass, settings: &Settings, needs: MapNeeds) -> Vec<usize> {
+    let mut states = vec![0];
+    for ((_, switch), bit) in pass.row().switches.iter().zip(0..) {
+        let on = match switch {
+            Switch::Bounces => settings.rt_bounces > 0,
+            Switch::MapFog | Switch::LitFog => needs.fog,
+            Switch::Gloss => needs.gloss && settings.rt_specular,
+        };
+        if !on {
+            continue;
+        }
+        let with = states.iter().map(|state| state | 1 << bit).collect();
+        if *switch == Switch::LitFog {
+            // fog out of sight is not lit
+            states.extend::<Vec<usize>>(with);
+        } else {
+            states = with;
+        }
+    }
+    states
+}
+
+/// Compiles what frames with these settings run on a map and `passes` lacks.
 ///
 /// # Errors
 /// The driver refuses a pipeline.
-pub fn compile_ahead(passes: &PassSet, settings: &Settings, has_fog: bool) -> Result<(), Error> {
-    let fog: &[Pass] = if has_fog { &FOG_AHEAD } else { &[] };
-    let chosen = AHEAD.iter().filter(|&&pass| is_chosen(pass, settings));
+pub fn compile_ahead(passes: &PassSet, settings: &Settings, needs: MapNeeds) -> Result<(), Error> {
+    let fog: &[Pass] = if needs.fog { &FOG_AHEAD } else { &[] };
+    let is_needed = |pass: &Pass| match pass {
+        Pass::MirrorLight => needs.mirrors,
+        Pass::SpecularLight => needs.gloss && settings.rt_specular,
+        _ => true,
+    };
+    let chosen = AHEAD
+        .iter()
+        .filter(|&&pass| is_chosen(pass, settings) && is_needed(&pass));
     passes.compile_missing(chosen.chain(fog).flat_map(|&pass| {
-        let states: &[bool] = match pass.row().switch {
-            None => &[false],
-            Some((_, Switch::Bounces)) if settings.rt_bounces > 0 => &[true],
-            Some((_, Switch::MapFog)) if has_fog => &[true],
-            Some((_, Switch::LitFog)) if has_fog => &[true, false],
-            Some(_) => &[false],
-        };
-        states.iter().map(move |&on| (pass, on))
+        let states = states(pass, settings, needs);
+        states.into_iter().map(move |state| (pass, state))
     }))
 }
 

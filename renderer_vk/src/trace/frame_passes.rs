@@ -23,6 +23,8 @@ pub struct FrameFacts {
     pub map_fog: bool,
     /// There is bounced light.
     pub bounces: bool,
+    /// Materials reflect by their roughness.
+    pub gloss: bool,
 }
 
 impl FrameFacts {
@@ -31,6 +33,7 @@ impl FrameFacts {
             Switch::LitFog => self.fog_cells != [0; 2],
             Switch::MapFog => self.map_fog,
             Switch::Bounces => self.bounces,
+            Switch::Gloss => self.gloss,
         }
     }
 
@@ -145,9 +148,10 @@ impl<'a> FramePasses<'a> {
             debug_assert_eq!(missing, None, "not written before {pass:?} reads it");
             self.written.add(row.writes);
         }
-        let on = row
-            .switch
-            .is_some_and(|(_, switch)| self.facts.is_on(switch));
+        let switches = row.switches.iter().zip(0..);
+        let on = switches.fold(0, |bits, ((_, switch), bit)| {
+            bits | usize::from(self.facts.is_on(*switch)) << bit
+        });
         let pipeline = self.set.get(pass, on)?;
         let [x, y] = self.facts.invocations(row.size, pipeline);
         match pipeline {

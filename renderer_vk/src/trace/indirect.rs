@@ -14,7 +14,8 @@ use crate::settings::{DenoiserChoice, MOST_BOUNCES, Settings};
 const _: () = {
     assert!(t::STREAM_MIRRORS >= t::STREAM_BOUNCE + t::STREAMS * 3 * MOST_BOUNCES);
     assert!((t::STREAM_MIRRORS - t::STREAM_BOUNCE).is_multiple_of(t::STREAMS));
-    assert!(t::STREAM_PATH >= t::STREAM_MIRRORS + t::STREAMS * MOST_BOUNCES);
+    assert!(t::STREAM_SPECULAR >= t::STREAM_MIRRORS + t::STREAMS * (MOST_BOUNCES + 1));
+    assert!(t::STREAM_PATH > t::STREAM_SPECULAR);
 };
 
 /// Whether one of 2 × 2 pixels gathers bounced light: in a denoised picture the difference is invisible, and gathering
@@ -35,24 +36,54 @@ pub fn record(
 ) -> Result<(), Error> {
     let parts = if passes.facts.subsampled { 1 } else { 4 };
     // the number of the path is in the bits above those of the pixel
-    let runs = (0..samples).flat_map(|path| (0..parts).map(move |part| part | path << 2));
+    let runs =
+        (0..samples).flat_map(|path| (0..parts).map(move |part| part | path << t::PART_PATH_SHIFT));
     for part in runs {
-        for bounce in 0..transport.bounces {
-            if transport.mirror_count > 0 {
-                passes.run_numbered(Pass::MirrorLight, bounce, part)?;
-            }
-            passes.run_numbered(Pass::BounceRays, bounce, part)?;
-            let shade = if bounce + 1 < transport.bounces {
-                Pass::BounceShade
-            } else {
-                Pass::BounceShadeLast
-            };
-            passes.run_numbered(shade, bounce, part)?;
-            passes.run_numbered(Pass::BounceLight, bounce, part)?;
-        }
+        trace_path(passes, transport, transport.bounces, part)?;
     }
     if passes.facts.subsampled {
         passes.run(Pass::BounceUpsample)?;
+    }
+    Ok(())
+}
+
+/// Records the passes that gather the specular light of rough surfaces, by one path for each pixel that gathers.
+///
+/// # Errors
+/// Out of memory, or the driver refuses a pipeline.
+pub fn record_specular(
+    passes: &mut FramePasses<'_>,
+    transport: &TransportView,
+) -> Result<(), Error> {
+    let parts = if passes.facts.subsampled { 1 } else { 4 };
+    for part in (0..parts).map(|part| part | t::PART_SPECULAR) {
+        passes.run_numbered(Pass::SpecularLight, 0, part)?;
+        trace_path(passes, transport, transport.specular_bounces, part)?;
+    }
+    Ok(())
+}
+
+/// Records the bounces of the paths of one pixel of each cell.
+fn trace_path(
+    passes: &mut FramePasses<'_>,
+    transport: &TransportView,
+    bounces: u32,
+    part: u32,
+) -> Result<(), Error> {
+    let specular = part & t::PART_SPECULAR != 0;
+    for bounce in 0..bounces {
+        // mirrors light diffuse vertices
+        if transport.mirror_count > 0 && !(specular && bounce == 0) {
+            passes.run_numbered(Pass::MirrorLight, bounce, part)?;
+        }
+        passes.run_numbered(Pass::BounceRays, bounce, part)?;
+        let shade = if bounce + 1 < bounces {
+            Pass::BounceShade
+        } else {
+            Pass::BounceShadeLast
+        };
+        passes.run_numbered(shade, bounce, part)?;
+        passes.run_numbered(Pass::BounceLight, bounce, part)?;
     }
     Ok(())
 }

@@ -98,6 +98,10 @@ pub struct MaterialInfo {
 pub trait MaterialTable {
     /// The material drawn for `index` (after remapping), and its facts.
     fn info(&self, index: u32) -> (u32, MaterialInfo);
+    /// Whether materials reflect by their roughness.
+    fn has_gloss(&self) -> bool {
+        false
+    }
     /// Alpha coverage of a triangle by its texture coordinates.
     fn coverage(&self, _material: u32, _corners: [Vec2; 3]) -> Coverage {
         Coverage::Mixed

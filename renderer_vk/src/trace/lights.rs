@@ -64,6 +64,8 @@ pub struct MapLightSource<'a> {
     pub lists: &'a LightLists,
     /// Animation of each triangle light; missing entries are constant lights.
     pub flickers: &'a [Option<&'a Flicker>],
+    /// Of each triangle light, whether rays of bounced light meet it; missing entries are not met.
+    pub met: &'a [bool],
     /// Initial position of each brush model by the map's entities; triangle lights are at these positions.
     pub model_origins: &'a [Vec3],
     /// Radiance of the ambient light.
@@ -85,12 +87,23 @@ impl<'a> MapLightSource<'a> {
             suns: &[],
             lists,
             flickers: &[],
+            met: &[],
             model_origins: &[],
             ambient: Vec3::ZERO,
             light_cutoff: 0.0,
             bsp: None,
             occlusion: None,
         }
+    }
+
+    /// Whether rays meet a triangle light, with the radiance that the lists have: it neither moves nor changes.
+    fn is_met(&self, index: usize) -> bool {
+        let changes = self.flickers.get(index).is_some_and(Option::is_some);
+        let moves = self
+            .triangles
+            .get(index)
+            .is_none_or(|light| light.model != 0);
+        !changes && !moves && self.met.get(index).copied().unwrap_or(false)
     }
 
     /// Number of a point light; animated ones belong to each view.
@@ -197,19 +210,22 @@ fn ends(source: &MapLightSource<'_>) -> Vec<f32> {
     source.triangles.iter().map(part).collect()
 }
 
-/// Radiance of each surface as a light, by the surface's index; zero for surfaces without light.
-fn emitted(lights: &[TriangleLight]) -> Vec<Vec3> {
-    let mut radiance = Vec::new();
-    for light in lights {
+/// Each surface as a light, by the surface's index; zero for surfaces without light.
+fn emitted(source: &MapLightSource<'_>) -> Vec<t::EmittedLight> {
+    let mut emitted = Vec::new();
+    for (index, light) in source.triangles.iter().enumerate() {
         let surface = light.surface as usize;
-        if surface >= radiance.len() {
-            radiance.resize(surface + 1, Vec3::ZERO);
+        if surface >= emitted.len() {
+            emitted.resize(surface + 1, t::EmittedLight::default());
         }
-        if let Some(of_surface) = radiance.get_mut(surface) {
-            *of_surface = light.radiance;
+        if let Some(of_surface) = emitted.get_mut(surface) {
+            *of_surface = t::EmittedLight {
+                radiance: light.radiance,
+                met: u32::from(source.is_met(index)),
+            };
         }
     }
-    radiance
+    emitted
 }
 
 pub(super) fn triangle_light(light: &TriangleLight, end: f32, origin: Vec3) -> t::TriangleLight {
@@ -256,7 +272,7 @@ impl SortedTriangles {
         for (index, (light, end)) in source.triangles.iter().zip(ends(source)).enumerate() {
             let known = source.flickers.get(index).copied().flatten();
             let flicker = known.map(|flicker| sorted.flicker(flicker));
-            let number = sorted.add(source, light, end, flicker);
+            let number = sorted.add(source, light, end, flicker, source.is_met(index));
             sorted.numbers.push(number);
         }
         sorted
@@ -278,16 +294,20 @@ impl SortedTriangles {
         light: &TriangleLight,
         end: f32,
         flicker: Option<usize>,
+        met: bool,
     ) -> Option<u32> {
         let origin = match light.model {
             0 => Vec3::ZERO,
             // A scene of a test has no origins.
             model => (source.model_origins.get(model as usize).copied()).unwrap_or_default(),
         };
-        let placed = ChangingLight {
+        let mut placed = ChangingLight {
             light: triangle_light(light, end, origin),
             flicker,
         };
+        if met {
+            placed.light.flags |= c::LIGHT_MET;
+        }
         if light.model != 0 {
             match self.moving.iter_mut().find(|(m, _)| *m == light.model) {
                 Some((_, lights)) => lights.push(placed),
@@ -339,7 +359,7 @@ impl MapLights {
                 irradiance: sun.irradiance / PI,
             })
             .collect();
-        let emitted = emitted(source.triangles);
+        let emitted = emitted(source);
         let lists = source.lists;
         let length = |cluster| i32::try_from(cluster).map_or(0, |c| lists.row(c).len());
         let cells = source

@@ -10,6 +10,7 @@ use shaders::types::{Fog, MaterialBuffers};
 
 #[cfg(test)]
 use super::accel::AccelMemory;
+use super::ahead::MapNeeds;
 use super::cutout::{Coverage, coverage};
 use super::fog_light;
 use super::geometry::StaticGeometry;
@@ -20,7 +21,9 @@ use super::passes::counter_of;
 use super::surroundings::Surroundings;
 use super::tracer::Tracer;
 use super::view_tracer::{TracedMap, TracedView, ViewTracer};
-use relight::light::{Occlusion, Sight};
+use relight::RelitWorld;
+use relight::light::{Occlusion, Sight, TriangleLight};
+use relight::materials::light::SurfaceClass;
 
 use crate::assets::compile::sampler;
 use crate::assets::{Assets, Materials};
@@ -57,6 +60,10 @@ impl MaterialTable for Assets {
 
     fn generation(&self) -> u64 {
         self.materials.generation()
+    }
+
+    fn has_gloss(&self) -> bool {
+        self.materials.has_gloss()
     }
 
     fn sky_sampler(&self) -> u32 {
@@ -119,6 +126,23 @@ fn geometry(
     Ok(geometry)
 }
 
+/// Whether rays of bounced light meet a triangle light where it is.
+fn is_met(relit: &RelitWorld, light: &TriangleLight) -> bool {
+    let surface = relit.surfaces.get(light.surface as usize);
+    let Some(material) = surface.and_then(|s| relit.material_of(s)) else {
+        return false;
+    };
+    let found = &material.class;
+    let stops = matches!(
+        found.class,
+        SurfaceClass::Opaque | SurfaceClass::CutOut | SurfaceClass::Sky
+    );
+    light.triangle != u32::MAX
+        && stops
+        && !found.passed
+        && material.resolved.shader.deforms.is_empty()
+}
+
 /// Calls `with` with the lights of a map.
 fn with_lights<T>(
     world: &World,
@@ -128,7 +152,9 @@ fn with_lights<T>(
     let model_origins: Vec<_> = relit.models.iter().map(|m| m.origin).collect();
     let flickers: Vec<_> = relit.lights.iter().map(|l| relit.flicker_of(l)).collect();
     let occlusion = Occlusion::new(relit);
+    let met: Vec<bool> = relit.lights.iter().map(|l| is_met(relit, l)).collect();
     let source = MapLightSource {
+        met: &met,
         triangles: &relit.lights,
         points: &relit.point_lights,
         suns: &relit.suns,
@@ -216,6 +242,15 @@ impl TraceLook {
         self.lights = lights;
         self.tracer.forget_accumulated();
         Ok(())
+    }
+
+    /// What decides which passes frames of the map run.
+    pub fn needs(&self, world: &World, assets: &Assets) -> MapNeeds {
+        MapNeeds {
+            fog: !world.data.relit.bsp.fogs.is_empty(),
+            mirrors: self.geometry.mirrors.count(true, None) > 0,
+            gloss: assets.materials.has_gloss(),
+        }
     }
 
     /// Number of frames in the mean of `rt_accumulate`.

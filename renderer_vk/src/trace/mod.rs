@@ -45,6 +45,7 @@ pub mod pass_set;
 pub mod passes;
 mod shapes;
 mod solids;
+mod specular;
 pub mod still;
 pub mod surroundings;
 pub mod targets;

@@ -15,11 +15,14 @@ pub enum Pipeline {
     Compute(ComputePipeline),
 }
 
-/// Pipelines of each pass, with its switch off and on.
+/// Most switches of a pass.
+pub const SWITCHES: usize = 2;
+
+/// Pipelines of each pass, by the state of its switches: one bit each.
 pub struct PassSet {
     device: Device,
     tracer: Tracer,
-    pipelines: Vec<[OnceLock<Pipeline>; 2]>,
+    pipelines: Vec<[OnceLock<Pipeline>; 1 << SWITCHES]>,
 }
 
 impl PassSet {
@@ -42,13 +45,13 @@ impl PassSet {
         self.tracer
     }
 
-    /// The pipeline of a pass with its switch `on` or off; compiles it at first use.
+    /// The pipeline of a pass with these switches on (a bit each); compiles it at first use.
     ///
     /// # Errors
     /// The driver refuses the pipeline.
-    pub fn get(&self, pass: Pass, on: bool) -> Result<&Pipeline, Error> {
+    pub fn get(&self, pass: Pass, on: usize) -> Result<&Pipeline, Error> {
         let pass = pass.row().shares.unwrap_or(pass);
-        let place = &self.pipelines[pass as usize][usize::from(on)];
+        let place = &self.pipelines[pass as usize][on & ((1 << SWITCHES) - 1)];
         match place.get() {
             Some(made) => Ok(made),
             None => {
@@ -58,10 +61,11 @@ impl PassSet {
         }
     }
 
-    fn compile(&self, pass: Pass, on: bool) -> Result<Pipeline, Error> {
+    fn compile(&self, pass: Pass, on: usize) -> Result<Pipeline, Error> {
         let row = pass.row();
         let mut constants = row.constants.to_vec();
-        constants.extend(row.switch.map(|(id, _)| (id, u32::from(on))));
+        let switches = row.switches.iter().zip(0..);
+        constants.extend(switches.map(|((id, _), bit)| (*id, u32::from(on >> bit & 1 != 0))));
         let compute = |spirv| {
             let made = ComputePipeline::new(&self.device, row.name, spirv, &constants);
             made.map(Pipeline::Compute)
@@ -96,10 +100,10 @@ impl PassSet {
     /// The driver refuses a pipeline.
     pub fn compile_missing(
         &self,
-        variants: impl Iterator<Item = (Pass, bool)>,
+        variants: impl Iterator<Item = (Pass, usize)>,
     ) -> Result<(), Error> {
-        let is_missing = |&(pass, on): &(Pass, bool)| {
-            let place = &self.pipelines[pass as usize][usize::from(on)];
+        let is_missing = |&(pass, on): &(Pass, usize)| {
+            let place = &self.pipelines[pass as usize][on & ((1 << SWITCHES) - 1)];
             place.get().is_none()
         };
         let jobs: Vec<_> = variants

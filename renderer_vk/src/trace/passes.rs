@@ -51,6 +51,8 @@ pub enum Switch {
     MapFog,
     /// There is bounced light.
     Bounces,
+    /// Materials reflect by their roughness.
+    Gloss,
 }
 
 /// Data that passes exchange within a frame.
@@ -90,6 +92,10 @@ pub enum Resource {
     BounceLights,
     /// Bounced light without albedo.
     IndirectLight,
+    /// Specular reflection of the surface that a pixel shows.
+    GlossSurfaces,
+    /// Its light, without the reflectance.
+    GlossLight,
     /// Light at the points in fog.
     FogLight,
     /// The same, filtered.
@@ -161,8 +167,8 @@ pub struct Row {
     pub constants: &'static [(u32, u32)],
     /// The pass whose pipelines this one runs; of the same shader, constants and switch.
     pub shares: Option<Pass>,
-    /// Id of the constant that a switch sets to 0 or 1.
-    pub switch: Option<(u32, Switch)>,
+    /// Ids of constants that switches set to 0 or 1.
+    pub switches: &'static [(u32, Switch)],
     /// Resources that an earlier pass of the frame must have written.
     pub reads: &'static [Resource],
     /// Resources that it reads if this frame has written them, for the same table.
@@ -183,7 +189,7 @@ impl Row {
             size,
             constants: &[],
             shares: None,
-            switch: None,
+            switches: &[],
             reads: &[],
             may_read: &[],
             writes: &[],
@@ -203,7 +209,7 @@ macro_rules! passes {
         /// Declarations, in the order of [`Pass`].
         pub static TABLE: &[Row] = {
             #[allow(clippy::enum_glob_use)] // rows name many of them
-            use {Resource::*, Shader::{Compute, Rays}, Switch::{Bounces, LitFog, MapFog}};
+            use {Resource::*, Shader::{Compute, Rays}, Switch::{Bounces, Gloss, LitFog, MapFog}};
             &[$(Row { $($field: $value,)* ..Row::of(concat!($($about),+), $name, $shader, Size::$size) }),+]
         };
     };
@@ -218,22 +224,22 @@ passes! {
     }
     /// `Primary` compiled without rays: finishes the many pixels that show the surface of their first hit.
     PrimarySimple = "trace_primary_simple", Compute(&shaders::TRACE_PRIMARY_RGEN_NO_RAYS), Traced {
-        switch: Some((ids::fog_keep::LIT_FOG, LitFog)),
+        switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss)],
         reads: &[Scene, PrimaryHits],
-        writes: &[GBuffer, Positions, Normals, Shown, FogWeights, FogPoints],
+        writes: &[GBuffer, Positions, Normals, Shown, FogWeights, FogPoints, GlossSurfaces],
     }
     /// The surface that each other pixel shows behind mirrors, portals, glass and liquids, with the layers in front of
     /// it.
     Primary = "trace_primary", Rays(&shaders::TRACE_PRIMARY), Traced {
-        switch: Some((ids::fog_keep::LIT_FOG, LitFog)),
+        switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss)],
         reads: &[Scene, PrimaryHits],
-        writes: &[GBuffer, Positions, Normals, Shown, FogWeights, FogPoints],
+        writes: &[GBuffer, Positions, Normals, Shown, FogWeights, FogPoints, GlossSurfaces],
         counter: Some(t::COUNT_PRIMARY),
     }
     /// The side of glass or of a glossy surface that a pixel does not show.
     OtherSide = "trace_other_side", Rays(&shaders::TRACE_PRIMARY), Traced {
         shares: Some(Pass::Primary),
-        switch: Some((ids::fog_keep::LIT_FOG, LitFog)),
+        switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss)],
         reads: &[Scene, PrimaryHits, GBuffer],
         writes: &[Other],
     }
@@ -286,13 +292,13 @@ passes! {
     /// Rays of a bounce.
     BounceRays = "trace_bounce_rays", Rays(&shaders::TRACE_BOUNCE_RAYS), Cells {
         reads: &[Scene, GBuffer, Positions, Normals],
-        may_read: &[GradientPixels, BounceLights],
+        may_read: &[GradientPixels, BounceLights, GlossSurfaces],
         writes: &[BounceHits],
         counter: Some(t::COUNT_BOUNCE_RAYS),
     }
     /// Shades what they hit, and samples a light for it.
     BounceShade = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
-        switch: Some((ids::bounce::HAS_FOG, MapFog)),
+        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
         may_read: &[GradientPixels, BounceLights],
         writes: &[BounceLights],
@@ -300,17 +306,23 @@ passes! {
     /// The same of the last bounce, after which no path goes on.
     BounceShadeLast = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
         constants: &[(ids::bounce::LAST_BOUNCE, 1)],
-        switch: Some((ids::bounce::HAS_FOG, MapFog)),
+        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
         may_read: &[GradientPixels, BounceLights],
         writes: &[BounceLights],
     }
-    /// Shadow rays to those lights.
+    /// Shadow rays to those lights; the last writes the light of the paths, of one of both kinds.
     BounceLight = "trace_bounce_light", Rays(&shaders::TRACE_BOUNCE_LIGHT), Cells {
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceLights],
         may_read: &[GradientPixels],
-        writes: &[IndirectLight],
+        writes: &[IndirectLight, GlossLight],
         counter: Some(t::COUNT_BOUNCE_LIGHT),
+    }
+    /// Specular light of sampled lights at rough surfaces. The passes of a bounce then trace its other paths.
+    SpecularLight = "trace_specular_light", Rays(&shaders::TRACE_SPECULAR_LIGHT), Cells {
+        reads: &[Scene, Lights, GBuffer, Positions, Normals, GlossSurfaces],
+        writes: &[BounceLights],
+        counter: Some(t::COUNT_SPECULAR),
     }
     /// Interpolates bounced light to the pixels that did not gather it.
     BounceUpsample = "trace_bounce_upsample", Compute(&shaders::TRACE_BOUNCE_UPSAMPLE_COMP), Cells {
@@ -335,7 +347,7 @@ passes! {
     }
     /// A-SVGF: joins the light with that of earlier frames.
     Temporal = "trace_temporal", Compute(&shaders::TRACE_TEMPORAL_COMP), Traced {
-        switch: Some((ids::temporal::BOUNCES, Bounces)),
+        switches: &[(ids::temporal::BOUNCES, Bounces)],
         reads: &[GBuffer, Positions, Normals, DirectLight, IndirectLight],
         may_read: &[GradientPixels, Gradients],
         writes: &[FreshLight, DepthGradient, Past],
@@ -343,21 +355,21 @@ passes! {
     /// A-SVGF: first wavelet step; its result is the history of the next frame.
     WaveletFirst = "trace_wavelet", Compute(&shaders::TRACE_ATROUS_COMP), Traced {
         constants: &[(ids::atrous::NOISY_VARIANCE, 1), (ids::atrous::LAST, 0)],
-        switch: Some((ids::atrous::BOUNCES, Bounces)),
+        switches: &[(ids::atrous::BOUNCES, Bounces)],
         reads: &[FreshLight, DepthGradient],
         writes: &[LightHistory],
     }
     /// A-SVGF: second wavelet step.
     WaveletSecond = "trace_wavelet", Compute(&shaders::TRACE_ATROUS_COMP), Traced {
         constants: &[(ids::atrous::NOISY_VARIANCE, 0), (ids::atrous::LAST, 0)],
-        switch: Some((ids::atrous::BOUNCES, Bounces)),
+        switches: &[(ids::atrous::BOUNCES, Bounces)],
         reads: &[LightHistory, DepthGradient],
         writes: &[FreshLight],
     }
     /// A-SVGF: last wavelet step.
     WaveletLast = "trace_wavelet", Compute(&shaders::TRACE_ATROUS_COMP), Traced {
         constants: &[(ids::atrous::NOISY_VARIANCE, 0), (ids::atrous::LAST, 1)],
-        switch: Some((ids::atrous::BOUNCES, Bounces)),
+        switches: &[(ids::atrous::BOUNCES, Bounces)],
         reads: &[FreshLight, DepthGradient, Past],
         writes: &[LightHistory, DirectLight],
     }
@@ -384,7 +396,7 @@ passes! {
     /// The linear picture; in reference mode the mean over frames.
     Composite = "trace_composite", Compute(&shaders::TRACE_COMPOSITE_COMP), Traced {
         reads: &[GBuffer, Shown, DirectLight],
-        may_read: &[IndirectLight, Other, FogWeights, FogLight, FilteredFogLight, Gradients],
+        may_read: &[IndirectLight, GlossSurfaces, GlossLight, Other, FogWeights, FogLight, FilteredFogLight, Gradients],
         writes: &[Picture],
     }
     /// Temporal antialiasing, and upscaling with it.
@@ -447,7 +459,7 @@ impl Pass {
 }
 
 /// Number of ray counters.
-pub const COUNTERS: usize = t::COUNT_MIRRORS as usize + 1;
+pub const COUNTERS: usize = t::COUNT_SPECULAR as usize + 1;
 
 /// Number of the ray counter of the pass with this name.
 pub fn counter_of(name: &str) -> Option<usize> {

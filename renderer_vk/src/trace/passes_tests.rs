@@ -89,7 +89,7 @@ fn passes_that_share_pipelines_declare_the_same_ones() {
         let Some(shared) = row.shares.map(Pass::row) else {
             continue;
         };
-        let built = |row: &Row| (shader_of(row), row.constants, format!("{:?}", row.switch));
+        let built = |row: &Row| (shader_of(row), row.constants, format!("{:?}", row.switches));
         assert_eq!(built(row), built(shared), "{}", row.name);
         assert!(shared.shares.is_none(), "{}", row.name);
     }

@@ -39,6 +39,8 @@ pub struct OwnImages {
     pub other: bool,
     /// `Targets::indirect`.
     pub indirect: bool,
+    /// `Targets::specular` and `Targets::specular_light`.
+    pub specular: bool,
     /// `Targets::composite`; otherwise it is in the memory of `surface`.
     pub composite: bool,
     /// `Targets::fog`; otherwise it is in the memory of `position`.
@@ -90,6 +92,11 @@ pub struct Targets {
     pub depth_gradient: [Image; 2],
     /// Bounced light, in the same format. Absent where an image of the [`Denoiser`](super::denoise::Denoiser) serves.
     pub indirect: Option<Image>,
+    /// `Rgba32Uint`: specular reflection of the surface (`specular_surface.glsl`). Written by `primary_simple` and
+    /// `primary`, read by `specular_light`, `bounce_rays` and `composite`. Absent without rough surfaces.
+    pub specular: Option<Image>,
+    /// `R32Uint`, light: specular light before the reflectance. Absent without rough surfaces.
+    pub specular_light: Option<Image>,
     /// `indirect` holds zeros: it need not be cleared again while there is no bounced light.
     pub indirect_is_black: bool,
     /// `Rgba16F`: radiance at the traced size before exposure; 1 is display white of the classic look. Written by
@@ -144,6 +151,8 @@ impl Targets {
             direct: [direct, last_direct],
             depth_gradient: [depth_gradient, last_depth_gradient],
             indirect: None,
+            specular: None,
+            specular_light: None,
             indirect_is_black: false,
             composite,
             accumulation: None,
@@ -178,6 +187,14 @@ impl Targets {
             &mut self.indirect,
             own.indirect,
             "trace indirect",
+            Format::R32Uint,
+        )?;
+        let wide = Format::Rgba32Uint;
+        fit(&mut self.specular, own.specular, "trace specular", wide)?;
+        fit(
+            &mut self.specular_light,
+            own.specular,
+            "trace specular light",
             Format::R32Uint,
         )?;
         let share = |image: &mut Image, owner: &Image, apart: bool, name| {

@@ -22,6 +22,7 @@ use super::lights::MapLights;
 use super::motion::Motion;
 use super::pass_set::PassSet;
 use super::passes::{COUNTERS, Pass, Resource};
+use super::specular::SpecularTable;
 use super::targets::{OwnImages, Targets};
 use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
@@ -71,6 +72,9 @@ pub struct ViewTracer {
     motion: Motion,
     bloom: Bloom,
     counters: RayCounters,
+    specular_table: SpecularTable,
+    /// Estimator of specular light (`SPECULAR_*`).
+    pub(super) specular_estimator: u32,
     /// Colour channels of the target that are written: 1 red, 2 green, 4 blue.
     pub(super) channels: u32,
     /// Rays are counted.
@@ -117,6 +121,8 @@ impl ViewTracer {
             motion: Motion::default(),
             bloom: Bloom::default(),
             counters: RayCounters::default(),
+            specular_table: SpecularTable::default(),
+            specular_estimator: t::SPECULAR_BOTH,
             channels: 7,
             count_rays: false,
             targets: None,
@@ -230,7 +236,11 @@ impl ViewTracer {
         output: [u32; 2],
     ) -> Result<(), Error> {
         let settings = view.settings;
-        targets.fit(&self.device, own_images(settings, output))?;
+        let has_gloss = has_gloss(view.materials, settings);
+        targets.fit(&self.device, own_images(settings, output, has_gloss))?;
+        if has_gloss {
+            self.specular_table.make(&self.device)?;
+        }
         let params = self.prepare(targets, rec, view, output)?;
         targets.indirect_is_black &= settings.rt_bounces == 0;
         self.record_passes(targets, rec, settings, output, &params)?;
@@ -337,6 +347,9 @@ impl ViewTracer {
         } else {
             clear_indirect(targets, passes)?;
         }
+        if facts.gloss {
+            indirect::record_specular(passes, &params.transport)?;
+        }
         self.denoiser.filter(passes, &targets.scratch)?;
         // after the denoiser, which is the last to read the positions that the filtered light overwrites
         self.fog.record(passes, &targets.fog)?;
@@ -369,6 +382,7 @@ impl ViewTracer {
             subsampled: indirect::is_subsampled(settings),
             map_fog: params.scene.fog_count > 0,
             bounces: settings.rt_bounces > 0,
+            gloss: targets.specular.is_some(),
         }
     }
 
@@ -413,13 +427,14 @@ impl ViewTracer {
 
 /// The images of `Targets` that cannot share memory with others: a debug output shows them after those were written.
 /// `output`: size of the picture.
-fn own_images(settings: &Settings, output: [u32; 2]) -> OwnImages {
+fn own_images(settings: &Settings, output: [u32; 2], specular: bool) -> OwnImages {
     let shows_steps = settings.rt_debug != DebugOutput::None;
     let resolves = antialias::resolves(settings, output);
     OwnImages {
         accumulation: settings.rt_accumulate,
         other: !settings.rt_accumulate && (shows_steps || !resolves),
         indirect: denoise::in_use(settings) != DenoiserChoice::ASvgf,
+        specular,
         composite: shows_steps,
         fog: shows_steps,
     }
@@ -484,6 +499,11 @@ fn fog_in_sight(map: &TracedMap<'_>, view: &TracedScene) -> bool {
     let may_see = map.lights.fogs_seen_from(view.view.origin);
     let mut boxes = map.geometry.fog_boxes.iter().enumerate();
     boxes.any(|(i, fog)| !view.look.portals.is_empty() || (may_see(i) && !outside(fog, &frustum)))
+}
+
+/// Whether rough surfaces reflect light.
+fn has_gloss(materials: &dyn MaterialTable, settings: &Settings) -> bool {
+    settings.rt_specular && is_lit(settings) && materials.has_gloss()
 }
 
 /// Whether surfaces are lit; otherwise they show their albedo.

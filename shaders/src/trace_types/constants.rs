@@ -56,6 +56,8 @@ pub const MASK_NO_SHADOW: u8 = 0x80;
 
 /// Bits of `TriangleLight::flags`.
 pub const LIGHT_TWO_SIDED: u32 = 1;
+/// It is a triangle of the map that rays meet, and its radiance is constant.
+pub const LIGHT_MET: u32 = 2;
 
 /// Bits of `TraceView::flags`.
 pub const VIEW_JITTER: u32 = 1;
@@ -94,6 +96,7 @@ pub const COUNT_BOUNCE_RAYS: u32 = 3;
 pub const COUNT_BOUNCE_LIGHT: u32 = 4;
 pub const COUNT_SUNS: u32 = 5;
 pub const COUNT_MIRRORS: u32 = 6;
+pub const COUNT_SPECULAR: u32 = 7;
 
 /// Counters of each counted pass, to reduce contention.
 pub const COUNTER_ROWS: u32 = 64;
@@ -187,6 +190,24 @@ pub const STREAMS: u32 = 6;
 pub const STREAM_MIRRORS: u32 = 290;
 /// Distance between the streams of one path of a pixel and those of the next.
 pub const STREAM_PATH: u32 = 4096;
+/// The sampled light of a rough surface: before the streams of the next path.
+pub const STREAM_SPECULAR: u32 = 4000;
+
+/// `PassStep::part` of a bounce: bit of the paths that start at rough surfaces; number of the first bit of the path's
+/// number; below it the pixel of the cell.
+pub const PART_SPECULAR: u32 = 0x8000_0000;
+pub const PART_PATH_SHIFT: u32 = 2;
+/// Number of the first path that starts at a rough surface: above those of `rt_samples`.
+pub const SPECULAR_PATHS: u32 = 8;
+
+/// Estimators of specular light (`TransportView::specular_estimator`): rays by the surface's distribution and samples of
+/// lights, weighted; only one of them, for tests.
+pub const SPECULAR_BOTH: u32 = 0;
+pub const SPECULAR_LIGHTS: u32 = 1;
+pub const SPECULAR_RAYS: u32 = 2;
+
+/// Edge of the table of specular albedo, entries.
+pub const SPECULAR_TABLE: u32 = 32;
 
 /// Streams of the denoiser's random numbers (`dither` in `denoise.glsl`): rounding of the fresh light; with
 /// `rt_denoiser 2` of the number of frames.

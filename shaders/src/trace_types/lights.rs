@@ -59,6 +59,16 @@ pub struct SunLight {
     pub irradiance: Vec3,
 }
 
+/// A surface of the map as a light.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct EmittedLight {
+    /// Radiance; zero for surfaces in no list.
+    pub radiance: Vec3,
+    /// 1: its triangles have `LIGHT_MET`.
+    pub met: u32,
+}
+
 /// Bounds of a light for light sampling: a bounding sphere, and the emitted light.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -152,7 +162,7 @@ pub struct LightView {
     pub nodes: u64,
     /// Cell of each leaf (`i32`).
     pub leaf_cells: u64,
-    /// Radiance of each surface of the map as a light (`Vec3`); zero for those in no list.
+    /// [`EmittedLight`] of each surface of the map.
     pub emitted: u64,
     /// Start of the BSP walk for each box of a grid over the map (`i32`: a node, or `-1 - leaf`).
     pub grid: u64,

@@ -67,6 +67,9 @@ pub struct TransportView {
     pub mirror_of_surface: u64,
     /// For each cluster, a bit for each of the first `MASKED_MIRRORS` of `mirrors`: it may be visible from the cluster.
     pub mirror_reach: u64,
+    /// Pairs of floats, `SPECULAR_TABLE` rows by roughness of as many by the cosine to the view: the specular albedo is the
+    /// first times the reflectance at normal incidence, plus the second.
+    pub specular_albedo: u64,
     /// Number of `filters`.
     pub filter_count: u32,
     /// Number of `layers`; all ones: unknown, a ray tests layers always.
@@ -85,6 +88,10 @@ pub struct TransportView {
     pub mirror_clusters: u32,
     /// 1: glass and liquids mirror the rays of bounces.
     pub mirroring_layers: u32,
+    /// Most surfaces that the light of a rough surface has met before.
+    pub specular_bounces: u32,
+    /// `SPECULAR_*`.
+    pub specular_estimator: u32,
     /// To a multiple of eight bytes.
     pub padding: u32,
 }

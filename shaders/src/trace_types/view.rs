@@ -80,6 +80,10 @@ pub struct ImageView {
     pub direct: u32,
     /// R32UI: bounced light.
     pub indirect: u32,
+    /// RGBA32UI: specular reflection of the surface (`specular_surface.glsl`); `NO_IMAGE` without rough surfaces.
+    pub specular: u32,
+    /// R32UI: its light, before the reflectance.
+    pub specular_light: u32,
     /// RGBA16F: the picture; not written while frames are accumulated.
     pub composite: u32,
     /// RGBA32F: the mean of the accumulated frames.

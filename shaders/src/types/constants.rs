@@ -108,6 +108,15 @@ pub const MATERIAL_INVISIBLE: u32 = 4096;
 pub const MATERIAL_PASSED: u32 = 8192;
 /// Mirrors light: a stage represents a reflection of the surroundings, or it is glass or a liquid.
 pub const MATERIAL_REFLECTS: u32 = 16384;
+/// It reflects light by its roughness.
+pub const MATERIAL_ROUGH: u32 = 32768;
+/// It has a normal map.
+pub const MATERIAL_NORMALS: u32 = 65536;
+
+/// Channels of a material's specular map: roughness and metal in green and blue, as in glTF.
+pub const SPECULAR_MAP_ROUGH_METAL: u32 = 0;
+/// Reflectance in red, green and blue, as displayed; one minus the roughness in alpha.
+pub const SPECULAR_MAP_REFLECTANCE: u32 = 1;
 
 /// Drawn in front of everything near (first-person weapon).
 pub const INSTANCE_DEPTH_HACK: u32 = 1;

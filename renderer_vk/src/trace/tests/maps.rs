@@ -94,9 +94,8 @@ impl Game {
         frames: u32,
     ) -> (Vec<u8>, TraceLook) {
         let device = &self.gpu.device;
-        let has_fog = !world.data.relit.bsp.fogs.is_empty();
-        compile_ahead(passes, settings, has_fog).expect("pipelines");
         let mut look = TraceLook::new(passes, world, assets).expect("structures");
+        compile_ahead(passes, settings, look.needs(world, assets)).expect("pipelines");
         let ahead = device.compiled_pipelines();
         assets
             .materials

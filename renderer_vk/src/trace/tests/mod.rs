@@ -21,6 +21,7 @@ mod mirrors;
 mod models;
 mod motion;
 mod parts;
+mod rough;
 mod sides;
 mod skies;
 mod structures;

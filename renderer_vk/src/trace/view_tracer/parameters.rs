@@ -61,7 +61,7 @@ impl ViewTracer {
             materials: traced.materials.buffers(),
             scene: scene_view(rec, traced, prepared)?,
             lights: lights.of_view(rec, scene, settings)?,
-            transport: transport(rec, traced)?,
+            transport: self.transport(rec, traced)?,
             motion: prepared.motion,
             denoise: (self.denoiser).view(self.frame.wrapping_sub(1), targets),
             flares: FlareView {
@@ -88,6 +88,64 @@ impl ViewTracer {
                 self.frame
             },
             accumulated,
+        })
+    }
+
+    /// Boxes that rays are tested against: around translucent layers, geometry behind skies, and surfaces that filter
+    /// light.
+    fn transport(
+        &self,
+        rec: &mut Recorder,
+        traced: &TracedView<'_>,
+    ) -> Result<TransportView, Error> {
+        let TracedView {
+            scene: view,
+            map,
+            materials,
+            settings,
+            ..
+        } = *traced;
+        let geometry = map.map(|m| m.geometry);
+        let boxes = in_sight(view, geometry, materials);
+        let (layers, layer_count) = if settings.rt_dof {
+            // rays start away from the camera
+            (0, u32::MAX)
+        } else {
+            let count = u32::try_from(boxes.len()).unwrap_or(u32::MAX);
+            (rec.arena().push(&boxes)?, count)
+        };
+        let lens = if settings.rt_dof {
+            settings.rt_aperture
+        } else {
+            0.0
+        };
+        let camera = camera_frame(view).origin;
+        let beyond = Beyond::of(view, camera, lens, geometry, materials);
+        let (mirror_reach, mirror_clusters) = geometry.map_or((0, 0), |g| g.mirrors.reach());
+        let [mirrors, mirror_of_surface] = geometry.map_or([0; 2], |g| g.mirrors.addresses());
+        Ok(TransportView {
+            mirrors,
+            mirror_of_surface,
+            mirror_reach,
+            mirror_count: map.map_or(0, |m| mirror_count(&m, view, settings)),
+            mirror_clusters,
+            mirroring_layers: u32::from(
+                settings.rt_accumulate && geometry.is_some_and(|g| g.mirrors.has_layers()),
+            ),
+            specular_albedo: self.specular_table.address(),
+            specular_bounces: specular_bounces(settings),
+            specular_estimator: self.specular_estimator,
+            padding: 0,
+            filters: geometry.map_or(0, |g| g.surroundings.filters()),
+            filter_count: geometry.map_or(0, |g| g.surroundings.filter_count()),
+            layers,
+            layer_count,
+            beyond: rec.arena().push(&beyond.boxes)?,
+            beyond_surfaces: rec.arena().push(&beyond.surfaces)?,
+            beyond_count: u32::try_from(beyond.boxes.len()).unwrap_or(u32::MAX),
+            beyond_surface_count: u32::try_from(32 * beyond.surfaces.len()).unwrap_or(u32::MAX),
+            max_depth: settings.rt_max_depth,
+            bounces: settings.rt_bounces.min(MOST_BOUNCES),
         })
     }
 
@@ -161,6 +219,8 @@ impl ViewTracer {
             other: other.storage_index(),
             direct: targets.direct[0].storage_index(),
             indirect: indirect.storage_index(),
+            specular: (targets.specular.as_ref()).map_or(t::NO_IMAGE, Image::storage_index),
+            specular_light: (targets.specular_light.as_ref()).map_or(0, Image::storage_index),
             composite: targets.composite.storage_index(),
             accumulation: (targets.accumulation.as_ref()).map_or(0, Image::storage_index),
             motion: targets.motion.storage_index(),
@@ -208,55 +268,14 @@ fn camera_view(traced: &TracedView<'_>, height: u32) -> CameraView {
     }
 }
 
-/// Boxes that rays are tested against: around translucent layers, geometry behind skies, and surfaces that filter
-/// light.
-fn transport(rec: &mut Recorder, traced: &TracedView<'_>) -> Result<TransportView, Error> {
-    let TracedView {
-        scene: view,
-        map,
-        materials,
-        settings,
-        ..
-    } = *traced;
-    let geometry = map.map(|m| m.geometry);
-    let boxes = in_sight(view, geometry, materials);
-    let (layers, layer_count) = if settings.rt_dof {
-        // rays start away from the camera
-        (0, u32::MAX)
-    } else {
-        let count = u32::try_from(boxes.len()).unwrap_or(u32::MAX);
-        (rec.arena().push(&boxes)?, count)
-    };
-    let lens = if settings.rt_dof {
-        settings.rt_aperture
-    } else {
-        0.0
-    };
-    let camera = camera_frame(view).origin;
-    let beyond = Beyond::of(view, camera, lens, geometry, materials);
-    let (mirror_reach, mirror_clusters) = geometry.map_or((0, 0), |g| g.mirrors.reach());
-    let [mirrors, mirror_of_surface] = geometry.map_or([0; 2], |g| g.mirrors.addresses());
-    Ok(TransportView {
-        mirrors,
-        mirror_of_surface,
-        mirror_reach,
-        mirror_count: map.map_or(0, |m| mirror_count(&m, view, settings)),
-        mirror_clusters,
-        mirroring_layers: u32::from(
-            settings.rt_accumulate && geometry.is_some_and(|g| g.mirrors.has_layers()),
-        ),
-        padding: 0,
-        filters: geometry.map_or(0, |g| g.surroundings.filters()),
-        filter_count: geometry.map_or(0, |g| g.surroundings.filter_count()),
-        layers,
-        layer_count,
-        beyond: rec.arena().push(&beyond.boxes)?,
-        beyond_surfaces: rec.arena().push(&beyond.surfaces)?,
-        beyond_count: u32::try_from(beyond.boxes.len()).unwrap_or(u32::MAX),
-        beyond_surface_count: u32::try_from(32 * beyond.surfaces.len()).unwrap_or(u32::MAX),
-        max_depth: settings.rt_max_depth,
-        bounces: settings.rt_bounces.min(MOST_BOUNCES),
-    })
+/// Most surfaces that the light of a rough surface has met before. In the mean of many frames a rough surface and a mirror
+/// show the same bounces: those of what they reflect.
+fn specular_bounces(settings: &Settings) -> u32 {
+    let bounces = settings.rt_bounces.min(MOST_BOUNCES);
+    match settings.rt_accumulate {
+        true => bounces + 1,
+        false => bounces.max(1),
+    }
 }
 
 /// Number of flat mirrors across which light is sampled.

@@ -1,0 +1,197 @@
+//! Rough surfaces: white furnaces, agreement of estimators, limits of smooth and rough.
+
+use glam::Vec3;
+use shaders::trace_types::{SkyRecord, constants as t};
+use shaders::types::{Specular, constants as c};
+
+use super::bounces::{furnace, seen};
+use super::harness::{
+    Gpu, Scene, bounced, encode, floor_at, gpu_tests, rectangle, reference, stage, through_byte,
+};
+use crate::settings::Settings;
+
+gpu_tests! {
+    any: [
+        a_white_furnace_keeps_its_energy,
+        light_samples_and_rays_find_the_same_light,
+        a_smooth_metal_is_a_mirror,
+        a_sun_shows_in_a_rough_floor,
+        rough_surfaces_light_others,
+    ],
+}
+
+/// Gives a material specular reflection.
+fn shine(scene: &mut Scene, material: u32, roughness: f32, metal: f32, reflectance: f32) {
+    let gpu = &mut scene.materials[material as usize];
+    gpu.0.flags |= c::MATERIAL_ROUGH;
+    gpu.1.flags |= c::MATERIAL_ROUGH;
+    gpu.0.specular = Specular {
+        roughness,
+        metal,
+        reflectance,
+        map: c::NO_TEXTURE,
+        normals: c::NO_TEXTURE,
+        ..Specular::default()
+    };
+}
+
+/// A white ball before an even sky of radiance `sky`.
+fn ball_in_a_furnace(roughness: f32, metal: f32, reflectance: f32) -> Scene {
+    let camera = Vec3::new(-100.0, 0.0, 0.0);
+    let mut scene = Scene::new(camera, Vec3::ZERO, 12.0, 12);
+    let white = scene.diffuse(1.0);
+    shine(&mut scene, white, roughness, metal, reflectance);
+    scene.ball(Vec3::ZERO, 18.0, 32, white, true);
+    let glow = scene.material(&[stage::constant([encode(0.5); 3])], 0);
+    scene.room(Vec3::splat(-300.0), Vec3::splat(300.0), glow);
+    scene
+}
+
+fn a_white_furnace_keeps_its_energy(gpu: &mut Gpu) {
+    let sky = through_byte(encode(0.5));
+    for (metal, reflectance) in [(1.0, 0.0), (0.0, 0.04), (0.0, 0.5), (0.5, 0.04)] {
+        for roughness in [0.0, 0.2, 0.4, 0.7, 1.0] {
+            let scene = ball_in_a_furnace(roughness, metal, reflectance);
+            let mean = gpu.mean(&scene, &bounced(1), 64).x;
+            println!(
+                "metal {metal}, {reflectance}, roughness {roughness}: {}",
+                mean / sky
+            );
+            assert!(
+                (mean / sky - 1.0).abs() < 0.003,
+                "metal {metal}, reflectance {reflectance}, roughness {roughness}: {}",
+                mean / sky
+            );
+        }
+    }
+}
+
+/// A floor of metal below a lamp that faces down.
+fn floor_below_a_lamp(roughness: f32) -> Scene {
+    let mut scene = Scene::new(
+        Vec3::new(-60.0, 0.0, 40.0),
+        Vec3::new(0.0, 0.0, 0.0),
+        50.0,
+        16,
+    );
+    let grey = scene.diffuse(0.5);
+    shine(&mut scene, grey, roughness, 0.5, 0.04);
+    scene.quad(floor_at(0.0, 500.0), grey);
+    let lamp = scene.material(&[stage::constant([0.0; 3])], c::MATERIAL_EMITTER);
+    // the corners of a ceiling's quad are clockwise from below
+    let corner = Vec3::new(20.0, -25.0, 60.0);
+    let [a, b, c, d] = rectangle(corner, Vec3::Y * 50.0, Vec3::X * 50.0);
+    scene.quad([a, b, c, d], lamp);
+    for triangle in [[a, b, c], [a, c, d]] {
+        scene.light(triangle, Vec3::splat(4.0));
+    }
+    for light in &mut scene.lights {
+        light.surface = 1;
+    }
+    scene.lights_are_met = true;
+    scene
+}
+
+/// The picture by each estimator.
+fn by_estimators(gpu: &mut Gpu, scene: &Scene, settings: &Settings, frames: u32) -> [Vec<Vec3>; 3] {
+    [t::SPECULAR_BOTH, t::SPECULAR_LIGHTS, t::SPECULAR_RAYS].map(|estimator| {
+        gpu.look.specular_estimator = estimator;
+        let (pixels, _) = gpu.render(scene, settings, frames);
+        gpu.look.specular_estimator = t::SPECULAR_BOTH;
+        pixels
+    })
+}
+
+fn mean_of(pixels: &[Vec3]) -> f32 {
+    pixels.iter().map(|p| p.x).sum::<f32>() / pixels.len() as f32
+}
+
+fn light_samples_and_rays_find_the_same_light(gpu: &mut Gpu) {
+    for roughness in [0.3, 0.6, 1.0] {
+        let scene = floor_below_a_lamp(roughness);
+        let pictures = by_estimators(gpu, &scene, &reference(), 512);
+        let [both, lights, rays] = [0, 1, 2].map(|i| mean_of(&pictures[i]));
+        println!("{roughness}: {both} {lights} {rays}");
+        assert!(
+            (lights / both - 1.0).abs() < 0.01,
+            "{roughness}: {both} {lights}"
+        );
+        assert!(
+            (rays / both - 1.0).abs() < 0.01,
+            "{roughness}: {both} {rays}"
+        );
+        // the lamp's own part of the picture
+        assert!(both > 0.05);
+    }
+}
+
+fn a_smooth_metal_is_a_mirror(gpu: &mut Gpu) {
+    // the roughness of 0 is the smallest that packed directions allow: nearly a mirror
+    let room = |scene: &mut Scene| {
+        let glow = scene.material(&[stage::constant([encode(0.5), encode(0.2), 0.0])], 0);
+        let wall = rectangle(Vec3::new(60.0, -80.0, 0.0), Vec3::Z * 60.0, Vec3::Y * 160.0);
+        scene.quad(wall, glow);
+    };
+    let camera = (Vec3::new(-60.0, 0.0, 40.0), Vec3::new(0.0, 0.0, 0.0));
+    let mut rough = Scene::new(camera.0, camera.1, 30.0, 16);
+    let white = rough.diffuse(1.0);
+    shine(&mut rough, white, 0.0, 1.0, 0.0);
+    rough.quad(floor_at(0.0, 500.0), white);
+    room(&mut rough);
+    let mut sharp = Scene::new(camera.0, camera.1, 30.0, 16);
+    let mirror = sharp.diffuse(1.0);
+    let gpu_material = &mut sharp.materials[mirror as usize];
+    gpu_material.0.flags |= c::MATERIAL_REFLECTS;
+    gpu_material.1.flags |= c::MATERIAL_REFLECTS;
+    gpu_material.0.specular.mirror = Vec3::ONE;
+    sharp.quad(floor_at(0.0, 500.0), mirror);
+    room(&mut sharp);
+    let (a, _) = gpu.render(&rough, &reference(), 256);
+    let (b, _) = gpu.render(&sharp, &reference(), 64);
+    let error = a
+        .iter()
+        .zip(&b)
+        .map(|(a, b)| (a - b).abs().element_sum())
+        .sum::<f32>()
+        / 256.0;
+    println!("{} {} {error}", mean_of(&a), mean_of(&b));
+    assert!((mean_of(&a) / mean_of(&b) - 1.0).abs() < 0.01);
+    assert!(error < 0.02, "{error}");
+}
+
+fn a_sun_shows_in_a_rough_floor(gpu: &mut Gpu) {
+    let mut scene = Scene::new(Vec3::new(-60.0, 0.0, 40.0), Vec3::ZERO, 50.0, 16);
+    let white = scene.diffuse(0.5);
+    shine(&mut scene, white, 0.5, 1.0, 0.0);
+    scene.quad(floor_at(0.0, 500.0), white);
+    scene.sun(Vec3::new(0.8, 0.0, 0.6), 3.0, 0.05);
+    let no_box = SkyRecord {
+        faces: [c::NO_TEXTURE; 6],
+        cloud_height: 512.0,
+    };
+    let sky = scene.sky(&[], no_box);
+    scene.room(Vec3::splat(-600.0), Vec3::splat(600.0), sky);
+    let pictures = by_estimators(gpu, &scene, &reference(), 512);
+    let [both, lights, rays] = [0, 1, 2].map(|i| mean_of(&pictures[i]));
+    println!("{both} {lights} {rays}");
+    assert!((lights / both - 1.0).abs() < 0.01);
+    // few rays meet the disc
+    assert!((rays / both - 1.0).abs() < 0.06);
+    assert!(both > 0.05);
+}
+
+fn rough_surfaces_light_others(gpu: &mut Gpu) {
+    // walls of metal emit e and reflect all light: the first surface shows the emission of each that follows
+    let e = through_byte(encode(0.25));
+    for roughness in [0.3, 0.8] {
+        let mut scene = furnace(1.0, 1.0);
+        shine(&mut scene, 0, roughness, 1.0, 0.0);
+        for bounces in [0, 1, 3] {
+            // what a rough surface reflects has the bounces of what a mirror shows
+            let exact = seen(e, 1.0, e * (bounces + 1) as f32);
+            let mean = gpu.mean(&scene, &bounced(bounces), 32).x;
+            println!("roughness {roughness}, {bounces} bounces: {mean} {exact}");
+            assert!((mean / exact - 1.0).abs() < 0.005, "{roughness}, {bounces}");
+        }
+    }
+}

@@ -1,0 +1,193 @@
+// Specular reflection of rough surfaces: microfacets with the GGX distribution (Walter et al., Microfacet Models for
+// Refraction through Rough Surfaces, 2007), Smith's height-correlated masking and shadowing (Heitz, Understanding the
+// Masking-Shadowing Function, JCGT 3(2), 2014), Schlick's approximation of Fresnel's factor, and light that is reflected
+// several times between microfacets as a factor of the single reflection (Turquin, Practical Multiple Scattering
+// Compensation for Microfacet Models, 2019). What the specular part reflects, the diffuse part below does not get.
+#ifndef RELIGHT_TRACE_SPECULAR_GLSL
+#define RELIGHT_TRACE_SPECULAR_GLSL
+
+#include "trace/layer.glsl"
+
+// 1: materials reflect by their roughness. 0 removes the code.
+layout(constant_id = 3) const uint HAS_GLOSS = 0;
+
+// Specular reflection at a point. `reflectance`: at normal incidence; `alpha`: width of the distribution, 0: none.
+struct Gloss {
+    vec3 reflectance;
+    float alpha;
+};
+
+const Gloss NO_GLOSS = Gloss(vec3(0.0), 0.0);
+
+// Smallest roughness: below it, the lobe is narrower than the precision of packed directions.
+const float LEAST_ROUGHNESS = 0.045;
+// Smallest cosine to the view: interpolated and mapped normals may turn away from it.
+const float LEAST_COSINE = 0.02;
+
+bool is_glossy(Gloss gloss) { return gloss.alpha > 0.0; }
+
+// Specular albedo for a white environment. `cosine`: to the view. Interpolated in a table, without compensation; `whole`:
+// the albedo of a surface that reflects all light at once.
+vec3 single_albedo(Gloss gloss, float cosine, out float whole) {
+    const float LAST = float(SPECULAR_TABLE - 1);
+    vec2 at = clamp(vec2(sqrt(clamp(cosine, 0.0, 1.0)), sqrt(gloss.alpha)) * LAST, 0.0, LAST);
+    uvec2 low = min(uvec2(at), SPECULAR_TABLE - 2);
+    vec2 part = at - vec2(low);
+    Pairs table = Pairs(VIEW.transport.specular_albedo);
+    uint row = low.y * SPECULAR_TABLE + low.x;
+    vec2 upper = mix(table.at[row], table.at[row + 1], part.x);
+    vec2 lower = mix(table.at[row + SPECULAR_TABLE], table.at[row + SPECULAR_TABLE + 1], part.x);
+    vec2 terms = mix(upper, lower, part.y);
+    whole = terms.x + terms.y;
+    return gloss.reflectance * terms.x + terms.y;
+}
+
+// Factor for light that is reflected several times.
+vec3 compensation(Gloss gloss, float whole) { return 1.0 + gloss.reflectance * (1.0 / max(whole, 1.0e-3) - 1.0); }
+
+// Part of a white environment's light that the point reflects.
+vec3 specular_albedo(Gloss gloss, float cosine) {
+    float whole;
+    vec3 single = single_albedo(gloss, cosine, whole);
+    return min(single * compensation(gloss, whole), 1.0);
+}
+
+// Parts of the square of `alpha`.
+float distribution(float alpha, float cosine) {
+    float a = alpha * alpha, d = cosine * cosine * (a - 1.0) + 1.0;
+    return a / (PI * d * d);
+}
+
+float smith_lambda(float alpha, float cosine) {
+    float c = cosine * cosine;
+    return 0.5 * (sqrt(1.0 + alpha * alpha * (1.0 - c) / max(c, 1.0e-12)) - 1.0);
+}
+
+vec3 schlick(vec3 reflectance, float cosine) {
+    float away = clamp(1.0 - cosine, 0.0, 1.0), squared = away * away;
+    return reflectance + (1.0 - reflectance) * (squared * squared * away);
+}
+
+// A view of a glossy point: its normal, turned so that the view lies above it, and the direction to the viewer.
+struct GlossView {
+    vec3 normal;
+    vec3 to_viewer;
+    float cosine;
+};
+
+GlossView gloss_view(vec3 normal, vec3 to_viewer) {
+    float cosine = dot(normal, to_viewer);
+    if (cosine < LEAST_COSINE) {
+        normal = normalize(normal + to_viewer * (LEAST_COSINE - cosine));
+        cosine = max(dot(normal, to_viewer), LEAST_COSINE);
+    }
+    return GlossView(normal, to_viewer, cosine);
+}
+
+// Density with which `gloss_direction` samples a direction, per solid angle.
+float gloss_density(Gloss gloss, GlossView view, vec3 direction) {
+    vec3 half_way = safe_normalize(view.to_viewer + direction, view.normal);
+    float masking = 1.0 / (1.0 + smith_lambda(gloss.alpha, view.cosine));
+    return distribution(gloss.alpha, dot(view.normal, half_way)) * masking / (4.0 * view.cosine);
+}
+
+// Reflectance of the point between two directions times the cosine, over the density of `gloss_direction`.
+vec3 gloss_weight(Gloss gloss, GlossView view, vec3 direction) {
+    float leaving = dot(view.normal, direction);
+    if (leaving <= 0.0) return vec3(0.0);
+    vec3 half_way = safe_normalize(view.to_viewer + direction, view.normal);
+    float lambda = smith_lambda(gloss.alpha, view.cosine);
+    float shadowing = (1.0 + lambda) / (1.0 + lambda + smith_lambda(gloss.alpha, leaving));
+    float whole;
+    single_albedo(gloss, view.cosine, whole);
+    return schlick(gloss.reflectance, dot(view.to_viewer, half_way)) * compensation(gloss, whole) * shadowing;
+}
+
+// Samples a direction of reflected light by the distribution of visible normals (Dupuy and Benyoub, Sampling Visible GGX
+// Normals with Spherical Caps, 2023). It may lead into the surface; its weight is 0 then.
+vec3 gloss_direction(Gloss gloss, GlossView view, vec2 u) {
+    vec3 t, b;
+    basis(view.normal, t, b);
+    vec3 seen = vec3(dot(view.to_viewer, t), dot(view.to_viewer, b), view.cosine);
+    vec3 stretched = normalize(vec3(seen.xy * gloss.alpha, seen.z));
+    float phi = 2.0 * PI * u.x, z = fma(1.0 - u.y, 1.0 + stretched.z, -stretched.z);
+    float r = sqrt(clamp(1.0 - z * z, 0.0, 1.0));
+    vec3 facet = vec3(r * cos(phi), r * sin(phi), z) + stretched;
+    facet = normalize(vec3(facet.xy * gloss.alpha, max(facet.z, 1.0e-6)));
+    vec3 normal = t * facet.x + b * facet.y + view.normal * facet.z;
+    return normalize(reflect(-view.to_viewer, normal));
+}
+
+// The gloss of a point, of its part that is no metal; `metal`: the other part.
+Gloss body_gloss(SurfacePoint p, Material material, Footprint footprint, out float metal) {
+    Specular specular = material.specular;
+    metal = specular.metal;
+    vec4 map = vec4(1.0);
+    if (specular.map != NO_TEXTURE) {
+        Lookups lookups = Lookups(vec2(0.0), 1.0, texture_lod(specular.map, p.texel_scale, footprint.width));
+        map = texel_mean(specular.map, specular.sampler_index, p.stage.st, lookups);
+    }
+    float roughness = specular.roughness;
+    vec3 reflectance = vec3(specular.reflectance);
+    if (specular.map_kind == SPECULAR_MAP_REFLECTANCE) {
+        if (specular.map != NO_TEXTURE) {
+            reflectance = decode_display(map.rgb) * specular.reflectance;
+            roughness = 1.0 - map.a * (1.0 - roughness);
+        }
+    } else {
+        roughness *= map.g;
+        metal *= map.b;
+    }
+    float rough = max(roughness, LEAST_ROUGHNESS);
+    return Gloss(reflectance, rough * rough);
+}
+
+// The shading normal of a point, on the side of its face: from the normal map, if the material has one. Tangents follow
+// the texture coordinates of the triangle (Mikkelsen, Simulation of Wrinkled Surfaces Revisited, 2008), perpendicular to
+// the interpolated normal.
+vec3 mapped_normal(SurfacePoint p, Material material, Footprint footprint) {
+    Specular specular = material.specular;
+    if (HAS_GLOSS == 0 || (material.flags & MATERIAL_NORMALS) == 0) return p.normal;
+    TraceVertices vertices = TraceVertices(p.vertices);
+    Vertex a = vertices.at[p.triangle.indices[0]], b = vertices.at[p.triangle.indices[1]], c = vertices.at[p.triangle.indices[2]];
+    Instance instance = instance_of(p.instance);
+    mat3 axis = mat3(instance.axis[0], instance.axis[1], instance.axis[2]);
+    vec3 ab = axis * (b.position - a.position), ac = axis * (c.position - a.position);
+    vec2 sb = b.st - a.st, sc = c.st - a.st;
+    float turn = sb.x * sc.y - sb.y * sc.x;
+    vec3 tangent = (ab * sc.y - ac * sb.y) * sign(turn);
+    tangent = safe_normalize(tangent - p.normal * dot(p.normal, tangent), vec3(0.0));
+    if (tangent == vec3(0.0)) return p.normal;
+    // t points down in texture coordinates, up in normal maps
+    vec3 along = (ac * sb.x - ab * sc.x) * sign(turn);
+    vec3 up = cross(p.normal, tangent);
+    if (dot(up, along) > 0.0) up = -up;
+    Lookups lookups = Lookups(vec2(0.0), 1.0, texture_lod(specular.normals, p.texel_scale, footprint.width));
+    vec3 texel = texel_mean(specular.normals, specular.sampler_index, p.stage.st, lookups).rgb;
+    vec2 slope = (texel.xy * 2.0 - 1.0) * specular.normal_scale;
+    vec3 local = vec3(slope, max(texel.z * 2.0 - 1.0, 0.05));
+    return safe_normalize(tangent * local.x + up * local.y + p.normal * local.z, p.normal);
+}
+
+// Gives the specular part of the light that reaches a layer to the result, and the rest to its diffuse part `lit`.
+// `direction`: of the ray that meets the point; `shine`: specular albedo.
+Gloss take_gloss(SurfacePoint p, Material material, Footprint footprint, vec3 direction, inout vec3 lit, out vec3 shine) {
+    shine = vec3(0.0);
+    if (HAS_GLOSS == 0 || (material.flags & MATERIAL_ROUGH) == 0 || p.kind == KIND_TRANSLUCENT) return NO_GLOSS;
+    float metal;
+    Gloss body = body_gloss(p, material, footprint, metal);
+    Gloss gloss = Gloss(mix(body.reflectance, clamp(lit, 0.0, 1.0), metal), body.alpha);
+    vec3 face = dot(p.face_normal, direction) > 0.0 ? -p.face_normal : p.face_normal;
+    GlossView view = gloss_view(dot(p.normal, face) < 0.0 ? -p.normal : p.normal, -direction);
+    shine = specular_albedo(gloss, view.cosine);
+    vec3 whole = lit, of_body = specular_albedo(body, view.cosine);
+    lit *= (1.0 - metal) * (1.0 - of_body);
+    if (metal > 0.0 && metal < 1.0) {
+        // a mixture has one lobe; what both lobes would reflect beyond it is scattered
+        vec3 of_metal = specular_albedo(Gloss(clamp(whole, 0.0, 1.0), body.alpha), view.cosine);
+        lit += max(mix(of_body, of_metal, metal) - shine, 0.0);
+    }
+    return gloss;
+}
+
+#endif

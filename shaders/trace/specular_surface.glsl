@@ -1,0 +1,39 @@
+// Specular reflection of the surface that a pixel shows, 16 bytes in `VIEW.images.specular`. Views without rough surfaces
+// have no such image.
+#ifndef RELIGHT_TRACE_SPECULAR_SURFACE_GLSL
+#define RELIGHT_TRACE_SPECULAR_SURFACE_GLSL
+
+#include "trace/direction.glsl"
+#include "trace/light_image.glsl"
+#include "trace/specular.glsl"
+
+struct GlossPixel {
+    Gloss gloss;
+    // Specular albedo, with all that lies between camera and surface: the specular light S of the point, for a white
+    // environment 1, shows as shine * S.
+    vec3 shine;
+    vec3 to_viewer; // from the surface along the path to the camera
+};
+
+bool has_gloss() { return VIEW.images.specular != NO_IMAGE; }
+
+void gloss_write(ivec2 pixel, GlossPixel g) {
+    if (HAS_GLOSS == 0) return;
+    uvec4 packed = uvec4(0);
+    if (is_glossy(g.gloss)) packed = uvec4(pack_light(g.gloss.reflectance, 0.5), pack_light(g.shine, 0.5), pack_normal(g.to_viewer), floatBitsToUint(g.gloss.alpha));
+    imageStore(uimages_rgba32ui[VIEW.images.specular], pixel, packed);
+}
+
+GlossPixel gloss_read(ivec2 pixel) {
+    uvec4 packed = imageLoad(uimages_rgba32ui[VIEW.images.specular], pixel);
+    return GlossPixel(Gloss(unpack_light(packed.x), uintBitsToFloat(packed.w)), unpack_light(packed.y), unpack_normal(packed.z));
+}
+
+// What the specular light of the pixel adds to its radiance.
+vec3 shown_gloss(ivec2 pixel) {
+    if (!has_gloss()) return vec3(0.0);
+    vec3 shine = unpack_light(imageLoad(uimages_rgba32ui[VIEW.images.specular], pixel).y);
+    return shine == vec3(0.0) ? vec3(0.0) : shine * light_read(VIEW.images.specular_light, pixel);
+}
+
+#endif
