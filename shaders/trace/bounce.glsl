@@ -130,22 +130,38 @@ vec3 sun_radiance(vec3 direction, uint chain) {
     return sum;
 }
 
-// The part of a light sample that a rough vertex reflects along the path. `both`: a ray by the surface's distribution
-// follows, and counts its share.
+// Samples of lights among which a rough vertex selects: those that are bright to a diffuse surface often lie outside of the
+// lobe.
+const uint ROUGH_CANDIDATES = 4;
+
+// A light sample of a rough vertex, by resampled importance sampling of what it reflects along the path. `both`: a ray by
+// the surface's distribution follows, and counts its share.
 LightSample rough_light(PathVertex v, bool both) {
     LightSet set = lights_at(v.position, v.face_normal, v.normal);
-    vec2 u;
-    LightChoice choice = one_choice(set, v.position, v.normal, u);
-    if (!(choice.weight > 0.0)) return no_light();
-    LightSample s = sample_light(choice.light, v.position, v.normal, u);
-    if (!(max_component(s.light) > 0.0) || dot(s.direction, v.face_normal) <= 0.0) return no_light();
+    LightSample selected = no_light();
+    if (set_count(set) == 0) return selected;
     GlossView view = gloss_view(v.normal, v.to_viewer);
-    float density = gloss_density(v.gloss, view, s.direction);
-    // L of the sample has the cosine and pi
-    s.light *= choice.weight * PI / max(dot(v.normal, s.direction), 1.0e-6);
-    s.light *= gloss_weight(v.gloss, view, s.direction) * density;
-    if (both) s.light *= 1.0 - ray_share_of(choice.light, v.position, s.direction, density);
-    return s;
+    float sum = 0.0, selected_target = 0.0;
+    for (uint i = 0; i < ROUGH_CANDIDATES; i++) {
+        vec2 u;
+        LightChoice choice = one_choice(set, v.position, v.normal, u);
+        if (!(choice.weight > 0.0)) continue;
+        LightSample s = sample_light(choice.light, v.position, v.normal, u);
+        if (!(max_component(s.light) > 0.0) || dot(s.direction, v.face_normal) <= 0.0) continue;
+        float density = gloss_density(v.gloss, view, s.direction);
+        // L of the sample has the cosine and pi
+        s.light *= choice.weight * PI / max(dot(v.normal, s.direction), 1.0e-6);
+        s.light *= gloss_weight(v.gloss, view, s.direction) * density;
+        if (both) s.light *= 1.0 - ray_share_of(choice.light, v.position, s.direction, density);
+        float target = luminance(s.light);
+        if (!(target > 0.0)) continue;
+        sum += target;
+        if (rng_next() * sum >= target) continue;
+        selected = s;
+        selected_target = target;
+    }
+    if (selected_target > 0.0) selected.light *= sum / (selected_target * float(ROUGH_CANDIDATES));
+    return selected;
 }
 
 // Decides whether a path goes on mirrored, by the brightest channel of both parts, and divides its throughput by the

@@ -4,6 +4,11 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
+float surface_distance(Hit hit, vec3 origin) {
+    SurfacePoint p = surface_point(hit);
+    return p.kind == KIND_SKY ? FAR : distance(p.position, origin);
+}
+
 void main() {
     ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(cell, bounce_cells()))) return;
@@ -17,11 +22,17 @@ void main() {
     uint chain;
     Hit hit = bounce_hit_read(cell, throughput, chain);
     bool onward = false;
-    if (gathers(task)) {
+    GlossPixel gloss;
+    if (gathers(task, gloss)) {
         random = bounce_random(task, push.number, BOUNCE_HITS, path_stream());
         vec3 origin = vertex_origin(v);
         if (push.number > 0) origin = bounce_origin_read(cell, b.found);
         else if (is_specular() || VIEW.transport.mirror_count > 0) bounce_origin_read(cell, b.found);
+        if (is_specular() && push.number == 0) {
+            // the filter of live frames reprojects by this distance
+            gloss.away = hit.geometry == NO_HIT ? 0.0 : surface_distance(hit, origin);
+            gloss_write(pixel, gloss);
+        }
         onward = hit.geometry != NO_HIT && bounce_shade(hit, origin, chain, throughput, b.found, v);
         if (onward) {
             if (v.chain == CHAIN_NONE) {

@@ -35,7 +35,7 @@ LightTask bounce_task(ivec2 pixel) {
 
 // Whether a path starts at the surface; `gloss`: its specular reflection, for specular light.
 bool gathers(LightTask task, out GlossPixel gloss) {
-    gloss = GlossPixel(NO_GLOSS, vec3(0.0), vec3(0.0, 0.0, 1.0));
+    gloss = NO_GLOSS_PIXEL;
     if (task.surface.view_distance < 0.0 || (VIEW.flags & VIEW_FULLBRIGHT) != 0) return false;
     if (!is_specular()) return true;
     gloss = gloss_read(task.pixel);

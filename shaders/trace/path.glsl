@@ -110,7 +110,7 @@ void keep_lit(SurfacePoint p, vec3 lit, vec3 shine, SeenLayer layer, Path path, 
     // the side that the path hits is lit
     kept.normal = dot(p.normal, kept.face_normal) < 0.0 ? -p.normal : p.normal;
     kept.albedo = lit;
-    kept_gloss = GlossPixel(layer.gloss, shine, -path.direction);
+    kept_gloss = GlossPixel(layer.gloss, shine, -path.direction, 0.0);
     kept.first_person = (instance_of(p.instance).flags & INSTANCE_FIRST_PERSON) != 0;
     kept_last = last;
     kept_bent = path.bent;

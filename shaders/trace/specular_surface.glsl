@@ -13,20 +13,23 @@ struct GlossPixel {
     // environment 1, shows as shine * S.
     vec3 shine;
     vec3 to_viewer; // from the surface along the path to the camera
+    float away; // distance that the pixel's path has gone to what the surface reflects; 0: unknown
 };
+
+const GlossPixel NO_GLOSS_PIXEL = GlossPixel(NO_GLOSS, vec3(0.0), vec3(0.0, 0.0, 1.0), 0.0);
 
 bool has_gloss() { return VIEW.images.specular != NO_IMAGE; }
 
 void gloss_write(ivec2 pixel, GlossPixel g) {
-    if (HAS_GLOSS == 0) return;
     uvec4 packed = uvec4(0);
-    if (is_glossy(g.gloss)) packed = uvec4(pack_light(g.gloss.reflectance, 0.5), pack_light(g.shine, 0.5), pack_normal(g.to_viewer), floatBitsToUint(g.gloss.alpha));
+    if (is_glossy(g.gloss)) packed = uvec4(pack_light(g.gloss.reflectance, 0.5), pack_light(g.shine, 0.5), pack_normal(g.to_viewer), packHalf2x16(vec2(g.gloss.alpha, min(g.away, 60000.0))));
     imageStore(uimages_rgba32ui[VIEW.images.specular], pixel, packed);
 }
 
 GlossPixel gloss_read(ivec2 pixel) {
     uvec4 packed = imageLoad(uimages_rgba32ui[VIEW.images.specular], pixel);
-    return GlossPixel(Gloss(unpack_light(packed.x), uintBitsToFloat(packed.w)), unpack_light(packed.y), unpack_normal(packed.z));
+    vec2 rest = unpackHalf2x16(packed.w);
+    return GlossPixel(Gloss(unpack_light(packed.x), rest.x), unpack_light(packed.y), unpack_normal(packed.z), rest.y);
 }
 
 // What the specular light of the pixel adds to its radiance.

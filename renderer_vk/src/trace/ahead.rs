@@ -9,7 +9,7 @@ use crate::settings::{DenoiserChoice, Settings};
 
 /// Passes that the settings decide about, or that every frame runs, the slowest to compile first. Others are
 /// compiled when a frame first runs them.
-const AHEAD: [Pass; 31] = [
+const AHEAD: [Pass; 33] = [
     Pass::Primary,
     Pass::BounceShadeLast,
     Pass::BounceShade,
@@ -36,6 +36,8 @@ const AHEAD: [Pass; 31] = [
     Pass::Histogram,
     Pass::Exposure,
     Pass::BounceUpsample,
+    Pass::SpecularTemporal,
+    Pass::SpecularFilter,
     Pass::ToneMap,
     Pass::SparseTemporal,
     Pass::SparseFilter,
@@ -54,7 +56,8 @@ fn is_chosen(pass: Pass, settings: &Settings) -> bool {
         Pass::MirrorLight | Pass::BounceRays | Pass::BounceShadeLast | Pass::BounceLight => {
             settings.rt_bounces > 0
         }
-        Pass::BounceUpsample => indirect::is_subsampled(settings),
+        Pass::BounceUpsample => indirect::is_subsampled(settings, false),
+        Pass::SpecularTemporal | Pass::SpecularFilter => indirect::is_subsampled(settings, true),
         Pass::Temporal
         | Pass::WaveletFirst
         | Pass::WaveletSecond
@@ -114,7 +117,9 @@ pub fn compile_ahead(passes: &PassSet, settings: &Settings, needs: MapNeeds) -> 
     let fog: &[Pass] = if needs.fog { &FOG_AHEAD } else { &[] };
     let is_needed = |pass: &Pass| match pass {
         Pass::MirrorLight => needs.mirrors,
-        Pass::SpecularLight => needs.gloss && settings.rt_specular,
+        Pass::SpecularLight | Pass::SpecularTemporal | Pass::SpecularFilter => {
+            needs.gloss && settings.rt_specular
+        }
         _ => true,
     };
     let chosen = AHEAD

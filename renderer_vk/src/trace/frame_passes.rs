@@ -17,7 +17,7 @@ pub struct FrameFacts {
     pub fog_cells: [u32; 2],
     /// Number of flares.
     pub flares: u32,
-    /// One of 2 × 2 pixels gathers bounced light.
+    /// One of 2 × 2 pixels gathers bounced and specular light.
     pub subsampled: bool,
     /// The map has fog.
     pub map_fog: bool,

@@ -18,10 +18,11 @@ const _: () = {
     assert!(t::STREAM_PATH > t::STREAM_SPECULAR);
 };
 
-/// Whether one of 2 × 2 pixels gathers bounced light: in a denoised picture the difference is invisible, and gathering
-/// is the most expensive pass. In reference mode and in undenoised pictures every pixel gathers.
-pub fn is_subsampled(settings: &Settings) -> bool {
-    denoise::in_use(settings) != DenoiserChoice::None && settings.rt_bounces > 0
+/// Whether one of 2 × 2 pixels gathers bounced and specular light: in a denoised picture the difference is invisible, and
+/// gathering is the most expensive pass. In reference mode and in undenoised pictures every pixel gathers. `gloss`:
+/// there are rough surfaces.
+pub fn is_subsampled(settings: &Settings, gloss: bool) -> bool {
+    denoise::in_use(settings) != DenoiserChoice::None && (settings.rt_bounces > 0 || gloss)
 }
 
 /// Records the passes that gather bounced light, by `samples` paths for each pixel that gathers. Where all pixels
@@ -59,6 +60,10 @@ pub fn record_specular(
     for part in (0..parts).map(|part| part | t::PART_SPECULAR) {
         passes.run_numbered(Pass::SpecularLight, 0, part)?;
         trace_path(passes, transport, transport.specular_bounces, part)?;
+    }
+    if passes.facts.subsampled {
+        passes.run(Pass::SpecularTemporal)?;
+        passes.run(Pass::SpecularFilter)?;
     }
     Ok(())
 }

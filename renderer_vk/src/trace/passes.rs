@@ -96,6 +96,8 @@ pub enum Resource {
     GlossSurfaces,
     /// Its light, without the reflectance.
     GlossLight,
+    /// The same, joined with that of earlier frames.
+    GlossHistory,
     /// Light at the points in fog.
     FogLight,
     /// The same, filtered.
@@ -323,6 +325,17 @@ passes! {
         reads: &[Scene, Lights, GBuffer, Positions, Normals, GlossSurfaces],
         writes: &[BounceLights],
         counter: Some(t::COUNT_SPECULAR),
+    }
+    /// Joins the specular light of the paths around a pixel with that of earlier frames.
+    SpecularTemporal = "trace_specular_filter", Compute(&shaders::TRACE_SPECULAR_TEMPORAL_COMP), Traced {
+        reads: &[GBuffer, Positions, Normals, GlossSurfaces, GlossLight],
+        may_read: &[GradientPixels],
+        writes: &[GlossHistory],
+    }
+    /// Smooths it by the size of the lobe on the screen.
+    SpecularFilter = "trace_specular_filter", Compute(&shaders::TRACE_SPECULAR_FILTER_COMP), Traced {
+        reads: &[Positions, Normals, GlossHistory],
+        writes: &[GlossLight],
     }
     /// Interpolates bounced light to the pixels that did not gather it.
     BounceUpsample = "trace_bounce_upsample", Compute(&shaders::TRACE_BOUNCE_UPSAMPLE_COMP), Cells {

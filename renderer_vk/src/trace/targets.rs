@@ -41,6 +41,8 @@ pub struct OwnImages {
     pub indirect: bool,
     /// `Targets::specular` and `Targets::specular_light`.
     pub specular: bool,
+    /// `Targets::specular_history`.
+    pub specular_history: bool,
     /// `Targets::composite`; otherwise it is in the memory of `surface`.
     pub composite: bool,
     /// `Targets::fog`; otherwise it is in the memory of `position`.
@@ -97,6 +99,11 @@ pub struct Targets {
     pub specular: Option<Image>,
     /// `R32Uint`, light: specular light before the reflectance. Absent without rough surfaces.
     pub specular_light: Option<Image>,
+    /// `Rg32Uint`: specular light joined with that of earlier frames (`specular_filter.glsl`), of this frame and the last.
+    /// Absent where no filter runs.
+    pub specular_history: Option<[Image; 2]>,
+    /// The last frame has written its image of them.
+    pub has_specular_history: bool,
     /// `indirect` holds zeros: it need not be cleared again while there is no bounced light.
     pub indirect_is_black: bool,
     /// `Rgba16F`: radiance at the traced size before exposure; 1 is display white of the classic look. Written by
@@ -153,6 +160,8 @@ impl Targets {
             indirect: None,
             specular: None,
             specular_light: None,
+            specular_history: None,
+            has_specular_history: false,
             indirect_is_black: false,
             composite,
             accumulation: None,
@@ -197,6 +206,15 @@ impl Targets {
             "trace specular light",
             Format::R32Uint,
         )?;
+        if !own.specular_history {
+            self.specular_history = None;
+            self.has_specular_history = false;
+        } else if self.specular_history.is_none() {
+            self.specular_history = Some([
+                make("trace specular history", Format::Rg32Uint)?,
+                make("trace last specular history", Format::Rg32Uint)?,
+            ]);
+        }
         let share = |image: &mut Image, owner: &Image, apart: bool, name| {
             let shares = image.owner().storage_index() == owner.storage_index();
             if shares == apart {
@@ -226,5 +244,9 @@ impl Targets {
         self.view_distance.swap(0, 1);
         self.direct.swap(0, 1);
         self.depth_gradient.swap(0, 1);
+        if let Some(history) = &mut self.specular_history {
+            history.swap(0, 1);
+            self.has_specular_history = true;
+        }
     }
 }

@@ -379,7 +379,7 @@ impl ViewTracer {
             output,
             fog_cells: self.fog.cells(),
             flares: params.flares.count,
-            subsampled: indirect::is_subsampled(settings),
+            subsampled: indirect::is_subsampled(settings, targets.specular.is_some()),
             map_fog: params.scene.fog_count > 0,
             bounces: settings.rt_bounces > 0,
             gloss: targets.specular.is_some(),
@@ -435,6 +435,7 @@ fn own_images(settings: &Settings, output: [u32; 2], specular: bool) -> OwnImage
         other: !settings.rt_accumulate && (shows_steps || !resolves),
         indirect: denoise::in_use(settings) != DenoiserChoice::ASvgf,
         specular,
+        specular_history: specular && indirect::is_subsampled(settings, true),
         composite: shows_steps,
         fog: shows_steps,
     }

@@ -225,6 +225,9 @@ pub const DITHER_UPSAMPLED: u32 = 5;
 /// Column and row of the first candidate for the gradient sample.
 pub const DITHER_SAMPLE_COLUMN: u32 = 6;
 pub const DITHER_SAMPLE_ROW: u32 = 7;
+/// Rounding of specular light, and rotation of its taps.
+pub const DITHER_SPECULAR: u32 = 8;
+pub const DITHER_SPECULAR_TURN: u32 = 9;
 
 /// Lights of the pass of direct light (`SAMPLING` in `direct.rgen`): lights that it samples itself; lights that
 /// `sample_lights.comp` has sampled; suns.

@@ -84,6 +84,10 @@ pub struct ImageView {
     pub specular: u32,
     /// R32UI: its light, before the reflectance.
     pub specular_light: u32,
+    /// RG32UI: the light joined with that of earlier frames (`specular_filter.glsl`).
+    pub fresh_specular: u32,
+    /// `fresh_specular` of the last frame; `NO_IMAGE` if that had none.
+    pub last_specular: u32,
     /// RGBA16F: the picture; not written while frames are accumulated.
     pub composite: u32,
     /// RGBA32F: the mean of the accumulated frames.

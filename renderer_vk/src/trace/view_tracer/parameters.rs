@@ -81,7 +81,7 @@ impl ViewTracer {
             last_camera: self.history.unwrap_or_default(),
             width: targets.width,
             height: targets.height,
-            flags: self.flags(settings, accel.first_person),
+            flags: self.flags(settings, targets, accel.first_person),
             seed: if settings.rt_accumulate {
                 accumulated
             } else {
@@ -182,7 +182,7 @@ impl ViewTracer {
     }
 
     /// The bits `VIEW_*` of a view. `first_person`: some geometry is visible to camera rays alone.
-    fn flags(&self, settings: &Settings, first_person: bool) -> u32 {
+    fn flags(&self, settings: &Settings, targets: &Targets, first_person: bool) -> u32 {
         let mut flags = 0;
         let mut set = |bit: u32, on: bool| flags |= if on { bit } else { 0 };
         set(
@@ -197,7 +197,10 @@ impl ViewTracer {
         set(t::VIEW_FAST_SKY, settings.hides_sky());
         set(t::VIEW_FULLBRIGHT, !is_lit);
         set(t::VIEW_DENOISE, self.denoiser.is_on());
-        set(t::VIEW_SUBSAMPLED_BOUNCE, is_subsampled(settings));
+        set(
+            t::VIEW_SUBSAMPLED_BOUNCE,
+            is_subsampled(settings, targets.specular.is_some()),
+        );
         set(t::VIEW_HISTORY, self.history.is_some());
         flags
     }
@@ -221,6 +224,11 @@ impl ViewTracer {
             indirect: indirect.storage_index(),
             specular: (targets.specular.as_ref()).map_or(t::NO_IMAGE, Image::storage_index),
             specular_light: (targets.specular_light.as_ref()).map_or(0, Image::storage_index),
+            fresh_specular: (targets.specular_history.as_ref())
+                .map_or(t::NO_IMAGE, |[fresh, _]| fresh.storage_index()),
+            last_specular: (targets.specular_history.as_ref())
+                .filter(|_| targets.has_specular_history)
+                .map_or(t::NO_IMAGE, |[_, last]| last.storage_index()),
             composite: targets.composite.storage_index(),
             accumulation: (targets.accumulation.as_ref()).map_or(0, Image::storage_index),
             motion: targets.motion.storage_index(),
