@@ -5,8 +5,8 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use relight::MemoryFiles;
 
-/// Files beside `file` that belong to the map, under their paths in a game folder: lights in a file (`NAME.lights`) and
-/// lightmaps (`NAME/lm_0000.tga` and so on).
+/// Files beside `file` that belong to the map, under their paths in a game folder: lights and materials in files
+/// (`NAME.lights`, `NAME.materials`) and lightmaps (`NAME/lm_0000.tga` and so on).
 ///
 /// # Errors
 /// Such a file exists and cannot be read.
@@ -19,9 +19,11 @@ pub fn beside(file: &Path) -> Result<MemoryFiles> {
             std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
         Ok(found.insert(&game_path, bytes)?)
     };
-    let lights = file.with_extension("lights");
-    if lights.is_file() {
-        take(&lights, format!("maps/{stem}.lights"))?;
+    for extension in ["lights", "materials"] {
+        let by_hand = file.with_extension(extension);
+        if by_hand.is_file() {
+            take(&by_hand, format!("maps/{stem}.{extension}"))?;
+        }
     }
     let folder = file.with_extension("");
     if folder.is_dir() {

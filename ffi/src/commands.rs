@@ -50,6 +50,7 @@ static COMMANDS: &[(&CStr, Function)] = &[
     (c"rt_path", path),
     (c"rt_preset", preset),
     (c"rt_menu", panels::menu),
+    (c"rt_reload", reload),
     (c"rt_photo", panels::photo),
     (c"rt_benchmark", benchmark::run),
     (c"report", report),
@@ -193,6 +194,15 @@ unsafe extern "C" fn lights() {
             report.longest_list
         ));
         lines
+    });
+}
+
+/// Reads the files of lights and materials beside the map again.
+unsafe extern "C" fn reload() {
+    print_lines(|renderer, _, _| match renderer.read_by_hand_again() {
+        Ok(true) => vec!["rt_reload: read the map's files of lights and materials again".into()],
+        Ok(false) => vec!["rt_reload: r_rt 1 reads these files when it first draws the map".into()],
+        Err(e) => vec![format!("rt_reload: {e}")],
     });
 }
 

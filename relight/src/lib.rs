@@ -39,6 +39,7 @@ pub mod export;
 pub mod exposure;
 mod external_lightmaps;
 pub mod files;
+mod hand_written;
 pub mod image;
 pub mod light;
 mod load;
@@ -58,6 +59,7 @@ pub use emitters::{
 };
 pub use external_lightmaps::external_lightmaps;
 pub use files::{FileError, GameFiles, MemoryFiles, Overlay, Pak, Pk3, Precedence, SearchPath};
+pub use hand_written::LineError;
 pub use load::{LoadError, Options, Progress, Stage};
 pub use map_files::map_files;
 pub use materials::{Materials, Resolved};

@@ -1,6 +1,7 @@
 //! Materials by name: what the scripts of a game define, what the engine makes of bare images, and the
 //! default for everything that is missing. [`light`]: what a material is to light.
 
+pub mod by_hand;
 pub mod light;
 
 use crate::files::GameFiles;

@@ -225,6 +225,9 @@ Layer run_stages(Material material, SurfacePoint p, Footprint footprint, uint se
         // shortcut for the many materials that are one image under light; same result as the loop below
         return Layer(plain_texel(material, p, footprint).rgb, vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
     }
+    if ((material.flags & MATERIAL_CLEAR) != 0)
+        return Layer(vec3(0.0), vec3(0.0), encode_display(material.dielectric.filter_color), vec3(0.0), vec3(0.0));
+    if ((material.flags & MATERIAL_PLAIN) != 0) seen = SEEN_LAST;
     Instance instance = instance_of(p.instance);
     Stages stages = Stages(VIEW.materials.stages);
     Layer layer = Layer(vec3(0.0), vec3(0.0), vec3(1.0), vec3(0.0), vec3(0.0));

@@ -97,6 +97,7 @@ impl Source {
             .map_or(map.to_owned(), |(pack, _)| format!("{pack}.pk3"));
         let names = [
             PathBuf::from(relight::light::lights_file(&map)),
+            PathBuf::from(relight::materials::by_hand::materials_file(&map)),
             PathBuf::from(map),
         ];
         let mut names = names.iter().chain(&self.lights);
@@ -196,6 +197,7 @@ fn find(
         let _ = sender.send(Progress::Part(part));
         wake();
     });
+    world.emit_by_hand(&*files);
     world.light_by_hand(&*files);
     sweep(&mut world, Some(cache));
     Ok(())
@@ -206,6 +208,8 @@ fn find(
 pub enum Changed {
     /// Lights by hand alone.
     Lights,
+    /// Materials by hand alone.
+    Materials,
     /// The map, its materials or its images.
     Map,
 }
@@ -273,6 +277,7 @@ fn kind(path: &Path) -> Option<Changed> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();
     match extension.as_str() {
         "lights" => Some(Changed::Lights),
+        "materials" => Some(Changed::Materials),
         other => WATCHED.contains(&other).then_some(Changed::Map),
     }
 }

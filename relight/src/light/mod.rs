@@ -22,7 +22,7 @@ mod visibility_rays;
 
 pub use crate::emitters::*;
 pub use bounds::STRONGEST;
-pub use by_hand::{ChangeableLights, LightsByHand, LightsLineError, lights_file};
+pub use by_hand::{ChangeableLights, LightsByHand, lights_file};
 pub use emission::GLOW_THRESHOLD;
 pub use judge::{ListJudgement, judge, lists_by_geometry, lists_by_visibility};
 pub use occlusion::Occlusion;

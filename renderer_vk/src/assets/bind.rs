@@ -23,6 +23,7 @@ pub(super) fn sky_faces(outer: &str, source: &mut dyn ImageSource) -> Option<[u3
         picmip: true,
         clamp: true,
         detail: false,
+        data: false,
     };
     let faces = Sky::SIDES.map(|side| {
         source

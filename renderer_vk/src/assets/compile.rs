@@ -254,6 +254,7 @@ impl StageArrays {
                 picmip: !stage.no_picmip,
                 clamp,
                 detail: stage.detail,
+                data: false,
             })
         };
         let sampler_of = |flags: ImageFlags| match (flags.clamp, flags.mipmap) {

@@ -1,5 +1,6 @@
 //! A registered material: a script's definition bound to images, in the form that the passes read.
 
+use super::finish::OfScript;
 use shaders::types::{Dielectric, Specular};
 use shaderscript::{AlphaGen, Cull, Deform, Fog, Shader, TcGen};
 
@@ -102,6 +103,8 @@ pub struct Material {
     pub order: u32,
     /// `MATERIAL_*` bits.
     pub flags: u32,
+    /// What the script decides about them, before files of materials.
+    pub of_script: OfScript,
     /// Transmission for rays.
     pub dielectric: Dielectric,
     /// Specular reflection for rays.

@@ -4,6 +4,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
 use glam::Vec3;
+use relight::materials::by_hand::MaterialsByHand;
 use shaders::types;
 use shaderscript::{ImplicitKind, RgbGen, Shader, StageImage, strip_extension};
 use support::slice::{part, span};
@@ -14,6 +15,7 @@ mod listing;
 use super::bind::{internal_shader, passes, sky_faces};
 use super::compile::{FOG_IMAGE, StageArrays, VideoClients, sampler};
 use super::dielectric;
+use super::finish::OfScript;
 use super::flags;
 use super::light_stage;
 use super::material::{LightmapClass, Material, SkyBox, VideoStage};
@@ -77,6 +79,8 @@ pub struct Materials {
     ranks: Vec<u32>,
     videos: VideoClients,
     scripts: Arc<relight::Materials>,
+    /// Files of materials.
+    pub(super) by_hand: MaterialsByHand,
     settings: MaterialSettings,
     internal: Internal,
     cloud_height: f32,
@@ -130,6 +134,7 @@ impl Materials {
             ranks: Vec::new(),
             videos: VideoClients::default(),
             scripts,
+            by_hand: MaterialsByHand::default(),
             settings,
             internal: Internal::default(),
             cloud_height: 512.0,
@@ -349,14 +354,16 @@ impl Materials {
         self.light_radiance.push(Vec3::ZERO);
         let dielectric =
             dielectric::dielectric(&shader, class, &self.arrays, stage_first as usize, source);
+        let flags = flags::material_flags(&shader, class) | dielectric::mirrors(&dielectric);
         let material = Material {
+            of_script: OfScript { flags, dielectric },
             name: name.to_owned(),
             lightmap_class: class,
             explicit,
             defaulted,
             sort,
             order,
-            flags: flags::material_flags(&shader, class) | dielectric::mirrors(&dielectric),
+            flags,
             dielectric,
             specular: types::Specular::default(),
             cull: shader.cull,
@@ -377,6 +384,9 @@ impl Materials {
             shader,
         };
         self.list.push(material);
+        for fault in self.finish(order as usize, source) {
+            log::warn!("{fault}");
+        }
         self.insert_sorted(order, sort);
         self.touch();
         order
@@ -556,7 +566,7 @@ impl Materials {
         self.touch();
     }
 
-    fn touch(&mut self) {
+    pub(super) fn touch(&mut self) {
         self.dirty = true;
         self.generation += 1;
     }

@@ -4,6 +4,7 @@ mod alpha;
 mod bind;
 pub mod compile;
 mod dielectric;
+mod finish;
 mod flags;
 mod fonts;
 mod light_stage;

@@ -62,7 +62,7 @@ impl TextureSettings {
 pub fn prepare(image: &Image, flags: ImageFlags, settings: &TextureSettings) -> Vec<Image> {
     let mut base = image.to_power_of_two(settings.round_down);
     let whole = (base.width, base.height);
-    if settings.greyscale > 0.0 {
+    if settings.greyscale > 0.0 && !flags.data {
         desaturate(&mut base.rgba, settings.greyscale);
     }
     let fades = flags.detail && settings.detail_fade;
@@ -80,12 +80,12 @@ pub fn prepare(image: &Image, flags: ImageFlags, settings: &TextureSettings) -> 
     while base.width > width || base.height > height {
         base = smaller(&base, settings.simple_mip_maps);
     }
-    if flags.mipmap && settings.intensity > 1.0 {
+    if flags.mipmap && settings.intensity > 1.0 && !flags.data {
         brighten(&mut base.rgba, settings.intensity);
     }
     // the engine does not modify images without mip levels, unless it halves them
     let halved = (base.width, base.height) != whole;
-    if settings.gamma != 1.0 && (flags.mipmap || halved) {
+    if settings.gamma != 1.0 && (flags.mipmap || halved) && !flags.data {
         apply_gamma(&mut base.rgba, settings.gamma);
     }
     if !flags.mipmap {

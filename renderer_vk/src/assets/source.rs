@@ -13,6 +13,8 @@ pub struct ImageFlags {
     pub clamp: bool,
     /// The image of a detail stage, whose mip levels `r_detailFade` makes grey.
     pub detail: bool,
+    /// Numbers and not colours: settings of brightness do not apply.
+    pub data: bool,
 }
 
 impl ImageFlags {
@@ -22,6 +24,12 @@ impl ImageFlags {
         picmip: true,
         clamp: false,
         detail: false,
+        data: false,
+    };
+    /// Flags of normal maps and maps of roughness.
+    pub const DATA: Self = Self {
+        data: true,
+        ..Self::WORLD
     };
     /// Flags of images registered without mip levels.
     pub const NO_MIP: Self = Self {
@@ -29,6 +37,7 @@ impl ImageFlags {
         picmip: false,
         clamp: true,
         detail: false,
+        data: false,
     };
 }
 

@@ -141,6 +141,22 @@ impl Renderer {
         Ok(changed)
     }
 
+    /// Reads the files of lights and materials beside the map again, and accumulation restarts. False without a traced
+    /// view, which reads them when it is first drawn.
+    ///
+    /// # Errors
+    /// The device is out of memory or lost.
+    pub fn read_by_hand_again(&mut self) -> Result<bool, Error> {
+        let (Some(world), Some(assets)) = (&mut self.world, &mut self.assets) else {
+            return Ok(false);
+        };
+        let read = world.read_by_hand_again(assets);
+        if let Some(trace) = self.trace.as_mut().filter(|_| read) {
+            trace.change_lights(world)?;
+        }
+        Ok(read)
+    }
+
     /// Number of frames in the mean of `rt_accumulate`; 0 without a traced view.
     pub fn accumulated_frames(&self) -> u32 {
         (self.trace.as_ref()).map_or(0, TraceLook::accumulated_frames)

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::Vec2;
 use shaders::trace_types::SkyRecord;
-use shaders::types::constants::NO_TEXTURE;
+use shaders::types::constants::{MATERIAL_CLEAR, MATERIAL_EMITTER, NO_TEXTURE};
 use shaders::types::{Fog, MaterialBuffers};
 
 #[cfg(test)]
@@ -33,6 +33,9 @@ use crate::scene::TracedScene;
 use crate::settings::Settings;
 use crate::world::World;
 
+/// Sort value of the engine's first class of blended surfaces (`SS_BLEND0`).
+const SORT_BLENDED: f32 = 9.0;
+
 impl MaterialTable for Assets {
     fn info(&self, index: u32) -> (u32, MaterialInfo) {
         let drawn = self.materials.resolve(index);
@@ -43,7 +46,10 @@ impl MaterialTable for Assets {
         });
         let info = MaterialInfo {
             flags: material.flags,
-            sort: material.sort,
+            sort: match material.flags & MATERIAL_CLEAR {
+                0 => material.sort,
+                _ => material.sort.max(SORT_BLENDED),
+            },
             order: material.order,
             sky,
         };
@@ -71,11 +77,14 @@ impl MaterialTable for Assets {
     }
 }
 
-/// A number that changes when a material is remapped or the height of a sky's clouds changes.
+/// A number that changes when a material is remapped, its part for rays changes, or the height of a sky's clouds.
 fn remapping(materials: &Materials) -> u64 {
     let mut hasher = DefaultHasher::new();
     materials.cloud_height().to_bits().hash(&mut hasher);
     for material in materials.iter() {
+        if material.flags & !MATERIAL_EMITTER != material.of_script.flags {
+            (material.order, material.flags & !MATERIAL_EMITTER).hash(&mut hasher);
+        }
         if let Some(drawn) = material.remapped {
             (material.order, drawn).hash(&mut hasher);
         }

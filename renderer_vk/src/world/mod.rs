@@ -205,6 +205,8 @@ pub struct World {
     lit: Option<Lit>,
     /// The current light before hand-written lights changed it.
     before_hand: Option<relight::world::Lighting>,
+    /// Lights before files of materials changed them, likewise.
+    before_files: Option<relight::world::Lighting>,
 }
 
 /// The current light of a map, and the alternative one.
@@ -289,6 +291,7 @@ impl World {
             data,
             lit: None,
             before_hand: None,
+            before_files: None,
         })
     }
 
@@ -361,11 +364,30 @@ impl World {
                 log::info!("{}: lights found in {:.1} s", relit.name, report.seconds);
             }
         }
+        for warning in relit.warnings.iter().skip(warned) {
+            log::warn!("{}: {warning}", relit.name);
+        }
+        self.read_by_hand(assets, cache);
+    }
+
+    /// Applies the files by hand to the map's own lights and materials, sweeps the light lists and marks emitters.
+    fn read_by_hand(&mut self, assets: &mut Assets, cache: Option<&relight::CalibrationCache>) {
+        let files = std::sync::Arc::clone(assets.textures.files());
+        let relit = &mut self.data.relit;
+        let warned = relit.warnings.len();
+        self.before_files = Some(relit.lighting());
+        let by_hand = relit.emit_by_hand(&*files);
         self.before_hand = Some(relit.lighting());
         if relit.light_by_hand(&*files) {
             log::info!("{}: lights as in {}", relit.name, relit.lights_file());
         }
         let swept = relight::light::sweep(relit, cache);
+        let names = assets.materials.iter().map(|m| m.name.as_str());
+        let own = relit.materials.iter().map(|m| m.name.as_str());
+        let unmatched = by_hand.unmatched(&relit.name, &own.chain(names).collect::<Vec<_>>());
+        relit.warnings.extend(unmatched);
+        let faults = (assets.materials).set_by_hand(by_hand, &mut assets.textures);
+        relit.warnings.extend(faults);
         for warning in relit.warnings.iter().skip(warned) {
             log::warn!("{}: {warning}", relit.name);
         }
@@ -382,6 +404,17 @@ impl World {
             swept.entries[0]
         );
         self.mark_emitters(assets);
+    }
+
+    /// Reads the files of lights and materials beside the map again. False before the first traced view, which reads
+    /// them.
+    pub(crate) fn read_by_hand_again(&mut self, assets: &mut Assets) -> bool {
+        let Some(before) = self.before_files.clone() else {
+            return false;
+        };
+        self.data.relit.set_lighting(before);
+        self.read_by_hand(assets, None);
+        true
     }
 
     /// The lights before hand-written ones changed them; `None` before the first traced view.

@@ -112,6 +112,10 @@ pub const MATERIAL_REFLECTS: u32 = 16384;
 pub const MATERIAL_ROUGH: u32 = 32768;
 /// It has a normal map.
 pub const MATERIAL_NORMALS: u32 = 65536;
+/// Its stages show painted reflections as the engine does, and no ray follows them.
+pub const MATERIAL_PLAIN: u32 = 131072;
+/// It shows none of its stages, but what it transmits by its filter colour.
+pub const MATERIAL_CLEAR: u32 = 262144;
 
 /// Channels of a material's specular map: roughness and metal in green and blue, as in glTF.
 pub const SPECULAR_MAP_ROUGH_METAL: u32 = 0;

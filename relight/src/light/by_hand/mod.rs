@@ -28,7 +28,9 @@ use super::{
     SunLight,
 };
 use crate::files::GameFiles;
-use crate::world::RelitWorld;
+use crate::hand_written::{LineError, lines, numbers, vector};
+use crate::materials::by_hand::MaterialsByHand;
+use crate::world::{RelitWorld, WorldMaterial};
 use glam::Vec3;
 
 /// The kind of lights that a line applies to.
@@ -51,32 +53,16 @@ pub struct LightsByHand {
     ambient: Option<Vec3>,
 }
 
-/// A line that cannot be used.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("line {line}: {what}")]
-pub struct LightsLineError {
-    /// Number of the line, from 1.
-    pub line: usize,
-    /// What is wrong with it.
-    pub what: String,
-}
-
 impl LightsByHand {
     /// Parses such a file. Invalid lines are skipped and returned as errors.
-    pub fn parse(text: &str) -> (LightsByHand, Vec<LightsLineError>) {
+    pub fn parse(text: &str) -> (LightsByHand, Vec<LineError>) {
         let mut file = LightsByHand::default();
         let mut wrong = Vec::new();
-        for (number, line) in text.lines().enumerate() {
-            let line = line.split("//").next().unwrap_or("");
-            let line = line.split('#').next().unwrap_or("");
-            let words: Vec<&str> = line.split_whitespace().collect();
+        for (line, words) in lines(text) {
             if let Some((key, rest)) = words.split_first()
                 && let Err(what) = file.line(key, rest)
             {
-                wrong.push(LightsLineError {
-                    line: number + 1,
-                    what,
-                });
+                wrong.push(LineError { line, what });
             }
         }
         (file, wrong)
@@ -228,6 +214,28 @@ impl RelitWorld {
         lights_file(&self.name)
     }
 
+    /// Applies the lines of [files of materials](MaterialsByHand) that state light. Returns the files, whose errors become
+    /// warnings of the world.
+    pub fn emit_by_hand(&mut self, files: &dyn GameFiles) -> MaterialsByHand {
+        let (by_hand, faults) = MaterialsByHand::load(files, &self.name);
+        self.warnings.extend(faults);
+        let stated = |material: &WorldMaterial| {
+            let (value, color) = by_hand.finish(&material.name).emission?;
+            Some((
+                material.name.clone(),
+                color * value * SURFACE_LIGHT_RADIANCE,
+            ))
+        };
+        let file = LightsByHand {
+            materials: self.materials.iter().filter_map(stated).collect(),
+            ..LightsByHand::default()
+        };
+        if !file.materials.is_empty() {
+            file.apply(self);
+        }
+        by_hand
+    }
+
     /// Applies the [file](LightsByHand) beside the map; whether there is one. Its errors become warnings of the world.
     pub fn light_by_hand(&mut self, files: &dyn GameFiles) -> bool {
         let path = self.lights_file();
@@ -280,28 +288,6 @@ fn kind(word: &str) -> Result<Kind, String> {
         "surfaces" => Ok(Kind::Surfaces),
         _ => Err(format!("{word:?} is none of points, suns, surfaces")),
     }
-}
-
-/// Finite numbers, between `least` and `most` of them.
-fn numbers(words: &[&str], least: usize, most: usize) -> Result<Vec<f32>, String> {
-    if words.len() < least || words.len() > most {
-        return Err(if least == most {
-            format!("{least} numbers belong here, not {}", words.len())
-        } else {
-            format!("{least} to {most} numbers belong here, not {}", words.len())
-        });
-    }
-    let number = |word: &&str| {
-        let parsed = word.parse().ok().filter(|n: &f32| n.is_finite());
-        parsed.ok_or_else(|| format!("{word:?} is not a number"))
-    };
-    words.iter().map(number).collect()
-}
-
-/// Three numbers from index `first` on; missing ones are 0.
-fn vector(numbers: &[f32], first: usize) -> Vec3 {
-    let number = |i: usize| numbers.get(first + i).copied().unwrap_or(0.0);
-    Vec3::new(number(0), number(1), number(2))
 }
 
 fn above_zero(number: f32, what: &str) -> Result<f32, String> {

@@ -112,6 +112,7 @@ impl Materials {
         for material in &mut self.list {
             if strip_extension(&material.name).eq_ignore_ascii_case(name) {
                 material.dielectric.absorption = Vec3::ZERO;
+                material.of_script.dielectric.absorption = Vec3::ZERO;
             }
         }
         self.touch();

@@ -1,0 +1,352 @@
+//! Materials written by hand: files that state how surfaces reflect, which the engine's scripts cannot.
+//!
+//! `maps/NAME.materials` belongs to `maps/NAME.bsp`; `scripts/*.materials` of a pack hold on all maps. Each line is a
+//! word, a name and values; `//` and `#` begin a comment. In names `*` stands for any characters and `?` for one.
+//!
+//! | line | meaning |
+//! |---|---|
+//! | `rough NAME ROUGHNESS [REFLECTANCE]` | reflects by a perceptual roughness of 0 to 1; reflectance at normal incidence, 0.04 without it |
+//! | `metal NAME [PART]` | this part of it is metal, all without a number |
+//! | `mirror NAME R G B` | mirrors this part of the light sharply, beside what its stages show |
+//! | `glass NAME INDEX R G B` | is glass of this refractive index, which lets this part of the light through |
+//! | `emit NAME LIGHT R G B` | shines, as with `q3map_surfacelight LIGHT` and this colour; 0 puts it out |
+//! | `normals NAME IMAGE [SCALE]` | has a normal map |
+//! | `surface NAME IMAGE` | has a map of roughness (green) and metal (blue), which multiply those of other lines |
+//! | `plain NAME` | reflects nothing: forgets the lines before, and shows painted reflections as the game does |
+//!
+//! Of several lines that match a name and state the same, the last counts: lines of a map follow those of packs.
+
+use glam::Vec3;
+
+use crate::files::GameFiles;
+use crate::hand_written::{LineError, lines, matches, numbers, vector};
+
+/// Reflectance at normal incidence of most materials that are no metal: an index of refraction of 1.5.
+pub const USUAL_REFLECTANCE: f32 = 0.04;
+/// Roughness of metal that nothing else states.
+const USUAL_METAL_ROUGHNESS: f32 = 0.3;
+
+/// How a material reflects, as files state it. What is `None` is as without them.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Finish {
+    /// Perceptual roughness, 0 to 1.
+    pub roughness: Option<f32>,
+    /// Reflectance at normal incidence of the part that is no metal.
+    pub reflectance: Option<f32>,
+    /// Part that is metal, 0 to 1.
+    pub metal: Option<f32>,
+    /// Part of the light that is mirrored sharply, linear.
+    pub mirror: Option<Vec3>,
+    /// Refractive index, and the part of the light that passes, linear.
+    pub glass: Option<(f32, Vec3)>,
+    /// Value and colour of emitted light; the largest channel of the colour is 1.
+    pub emission: Option<(f32, Vec3)>,
+    /// Image of normals, and factor of their slopes.
+    pub normals: Option<(String, f32)>,
+    /// Image with roughness in green and metal in blue.
+    pub surface: Option<String>,
+    /// Nothing is reflected but what later lines state.
+    pub plain: bool,
+}
+
+impl Finish {
+    /// Whether the surface reflects by its roughness.
+    pub fn is_rough(&self) -> bool {
+        self.roughness.is_some() || self.metal.is_some() || self.surface.is_some()
+    }
+
+    /// The roughness: that of a line, of the usual metal, or the whole of a map of it.
+    pub fn roughness_or_usual(&self) -> f32 {
+        self.roughness.unwrap_or(match self.surface {
+            Some(_) => 1.0,
+            None => USUAL_METAL_ROUGHNESS,
+        })
+    }
+}
+
+/// What a line states.
+#[derive(Debug, Clone, PartialEq)]
+enum Statement {
+    Rough(f32, Option<f32>),
+    Metal(f32),
+    Mirror(Vec3),
+    Glass(f32, Vec3),
+    Emit(f32, Vec3),
+    Normals(String, f32),
+    Surface(String),
+    Plain,
+}
+
+/// A line: what it states of the materials whose names match.
+#[derive(Debug, Clone, PartialEq)]
+struct Rule {
+    pattern: String,
+    statement: Statement,
+    line: usize,
+    /// It is of the map's own file.
+    of_map: bool,
+}
+
+/// The lines of files of materials, in the order in which they take effect.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct MaterialsByHand {
+    rules: Vec<Rule>,
+}
+
+impl MaterialsByHand {
+    /// Parses such a file. Invalid lines are skipped and returned as errors.
+    pub fn parse(text: &str) -> (MaterialsByHand, Vec<LineError>) {
+        let mut file = MaterialsByHand::default();
+        let wrong = file.add(text, false);
+        (file, wrong)
+    }
+
+    fn add(&mut self, text: &str, of_map: bool) -> Vec<LineError> {
+        let mut wrong = Vec::new();
+        for (line, words) in lines(text) {
+            match rule(&words) {
+                Ok((pattern, statement)) => self.rules.push(Rule {
+                    pattern: pattern.to_owned(),
+                    statement,
+                    line,
+                    of_map,
+                }),
+                Err(what) => wrong.push(LineError { line, what }),
+            }
+        }
+        wrong
+    }
+
+    /// Reads `scripts/*.materials`, and the file beside a map. Returns what is wrong with them, one line each.
+    pub fn load(files: &dyn GameFiles, map: &str) -> (MaterialsByHand, Vec<String>) {
+        let mut all = MaterialsByHand::default();
+        let mut faults = Vec::new();
+        let mut names = files.list("scripts", ".materials");
+        names.sort_unstable();
+        let packs = names.iter().map(|name| (format!("scripts/{name}"), false));
+        for (path, of_map) in packs.chain([(materials_file(map), true)]) {
+            match files.read(&path) {
+                Ok(Some(bytes)) => {
+                    let wrong = all.add(&String::from_utf8_lossy(&bytes), of_map);
+                    faults.extend(wrong.iter().map(|e| format!("{path}: {e}")));
+                }
+                Ok(None) => {}
+                Err(problem) => faults.push(problem.to_string()),
+            }
+        }
+        (all, faults)
+    }
+
+    /// Whether no line states anything.
+    pub fn is_empty(&self) -> bool {
+        self.rules.is_empty()
+    }
+
+    /// What the lines state of a material.
+    pub fn finish(&self, name: &str) -> Finish {
+        let mut finish = Finish::default();
+        for rule in self.rules.iter().filter(|r| matches(&r.pattern, name)) {
+            match &rule.statement {
+                Statement::Rough(roughness, reflectance) => {
+                    finish.roughness = Some(*roughness);
+                    finish.reflectance = reflectance.or(finish.reflectance);
+                }
+                Statement::Metal(part) => finish.metal = Some(*part),
+                Statement::Mirror(part) => finish.mirror = Some(*part),
+                Statement::Glass(index, part) => finish.glass = Some((*index, *part)),
+                Statement::Emit(value, color) => finish.emission = Some((*value, *color)),
+                Statement::Normals(image, scale) => {
+                    finish.normals = Some((image.clone(), *scale));
+                }
+                Statement::Surface(image) => finish.surface = Some(image.clone()),
+                Statement::Plain => {
+                    finish = Finish {
+                        plain: true,
+                        emission: finish.emission,
+                        ..Finish::default()
+                    };
+                }
+            }
+        }
+        finish
+    }
+
+    /// Lines of the map's own file that match none of these names, as a message for each.
+    pub fn unmatched(&self, map: &str, names: &[&str]) -> Vec<String> {
+        let path = materials_file(map);
+        let own = self.rules.iter().filter(|rule| rule.of_map);
+        own.filter(|rule| !names.iter().any(|name| matches(&rule.pattern, name)))
+            .map(|rule| {
+                let (line, pattern) = (rule.line, &rule.pattern);
+                format!("{path}: line {line}: no material matches {pattern}")
+            })
+            .collect()
+    }
+}
+
+/// Game path of the materials file of a map: its own path with the extension `.materials`.
+pub fn materials_file(map: &str) -> String {
+    let stem = map.strip_suffix(".bsp").unwrap_or(map);
+    format!("{stem}.materials")
+}
+
+fn part(number: f32, what: &str) -> Result<f32, String> {
+    (0.0..=1.0)
+        .contains(&number)
+        .then_some(number)
+        .ok_or_else(|| format!("{what} is from 0 to 1, not {number}"))
+}
+
+fn parts(color: Vec3, what: &str) -> Result<Vec3, String> {
+    for channel in color.to_array() {
+        part(channel, what)?;
+    }
+    Ok(color)
+}
+
+fn image(word: Option<&&str>) -> Result<String, String> {
+    word.map(|name| (*name).to_owned())
+        .ok_or_else(|| "the name of an image is missing".to_owned())
+}
+
+fn rule<'a>(words: &[&'a str]) -> Result<(&'a str, Statement), String> {
+    let (key, rest) = words.split_first().ok_or("no words")?;
+    let key = key.to_ascii_lowercase();
+    let known = [
+        "rough", "metal", "mirror", "glass", "emit", "normals", "surface", "plain",
+    ];
+    if !known.contains(&key.as_str()) {
+        return Err(format!(
+            "unknown word {key:?}; known are {}",
+            known.join(", ")
+        ));
+    }
+    let (name, rest) = rest.split_first().ok_or("a material's name is missing")?;
+    let statement = match key.as_str() {
+        "rough" => {
+            let n = numbers(rest, 1, 2)?;
+            let roughness = part(vector(&n, 0).x, "roughness")?;
+            let reflectance = n.get(1).map(|&r| part(r, "reflectance")).transpose()?;
+            Statement::Rough(roughness, reflectance)
+        }
+        "metal" => {
+            let n = numbers(rest, 0, 1)?;
+            Statement::Metal(part(
+                n.first().copied().unwrap_or(1.0),
+                "the part of metal",
+            )?)
+        }
+        "mirror" => {
+            let n = numbers(rest, 3, 3)?;
+            Statement::Mirror(parts(vector(&n, 0), "a mirrored part")?)
+        }
+        "glass" => {
+            let n = numbers(rest, 4, 4)?;
+            let index = vector(&n, 0).x;
+            if !(1.0..=4.0).contains(&index) {
+                return Err(format!("a refractive index is from 1 to 4, not {index}"));
+            }
+            Statement::Glass(index, parts(vector(&n, 1), "a transmitted part")?)
+        }
+        "emit" => {
+            let n = numbers(rest, 4, 4)?;
+            let (value, color) = (vector(&n, 0).x, vector(&n, 1));
+            if value < 0.0 || color.min_element() < 0.0 {
+                return Err("light cannot be below 0".to_owned());
+            }
+            let largest = color.max_element();
+            Statement::Emit(
+                value,
+                if largest > 0.0 {
+                    color / largest
+                } else {
+                    color
+                },
+            )
+        }
+        "normals" => {
+            let scale = match rest.get(1..).unwrap_or_default() {
+                [] => 1.0,
+                scale => vector(&numbers(scale, 1, 1)?, 0).x,
+            };
+            Statement::Normals(image(rest.first())?, scale)
+        }
+        "surface" => match rest {
+            [_] => Statement::Surface(image(rest.first())?),
+            _ => return Err("one image belongs here".to_owned()),
+        },
+        _ if rest.is_empty() => Statement::Plain,
+        _ => return Err(format!("nothing belongs behind plain {name}")),
+    };
+    Ok((name, statement))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::MemoryFiles;
+
+    #[test]
+    fn the_last_line_that_matches_counts() {
+        let text = "rough textures/* 0.8\nmetal *steel*\nRough *steel_wet 0.1 0.02 // rain\n\
+                    mirror *steel 0.2 0.3 0.4\nplain *rusty*\nemit *lamp 300 2 1 0\n\
+                    normals *steel textures/n_n 0.5\nsurface *steel textures/n_rm\nglass *pane 1.5 0.9 1 0.9\n";
+        let (file, wrong) = MaterialsByHand::parse(text);
+        assert_eq!(wrong, []);
+        let steel = file.finish("textures/base/STEEL");
+        assert_eq!((steel.roughness, steel.metal), (Some(0.8), Some(1.0)));
+        assert_eq!(steel.mirror, Some(Vec3::new(0.2, 0.3, 0.4)));
+        assert_eq!(steel.normals, Some(("textures/n_n".to_owned(), 0.5)));
+        assert_eq!(steel.surface.as_deref(), Some("textures/n_rm"));
+        let wet = file.finish("textures/steel_wet");
+        assert_eq!((wet.roughness, wet.reflectance), (Some(0.1), Some(0.02)));
+        let rusty = file.finish("textures/steel_rusty");
+        assert!(rusty.plain && !rusty.is_rough());
+        let lamp = file.finish("textures/lamp");
+        assert_eq!(lamp.emission, Some((300.0, Vec3::new(1.0, 0.5, 0.0))));
+        assert_eq!(
+            file.finish("a_pane").glass,
+            Some((1.5, Vec3::new(0.9, 1.0, 0.9)))
+        );
+        assert_eq!(file.finish("models/x"), Finish::default());
+    }
+
+    #[test]
+    fn wrong_lines_are_reported_with_their_numbers() {
+        let text = "rough a 1.5\nrough a\nshiny a 1\nmirror a 1 1\nglass a 0.5 1 1 1\nmetal\n\
+                    plain a 3\nnormals a\nnormals a b c\nsurface a b c\nrough a nan\nemit a -1 1 1 1\nrough a 0.5";
+        let (file, wrong) = MaterialsByHand::parse(text);
+        let lines: Vec<usize> = wrong.iter().map(|w| w.line).collect();
+        assert_eq!(lines, (1..=12).collect::<Vec<_>>(), "{wrong:?}");
+        assert_eq!(
+            wrong[0].to_string(),
+            "line 1: roughness is from 0 to 1, not 1.5"
+        );
+        assert!(wrong[2].to_string().contains("unknown word \"shiny\""));
+        assert_eq!(file.finish("a").roughness, Some(0.5));
+    }
+
+    #[test]
+    fn lines_of_a_map_follow_those_of_packs() {
+        let mut files = MemoryFiles::new();
+        files
+            .insert("scripts/b.materials", "rough a* 0.2\nbad")
+            .unwrap();
+        files
+            .insert("scripts/a.materials", "rough a* 0.1\n")
+            .unwrap();
+        files
+            .insert("maps/x.materials", "\nmetal ab\nmetal q*")
+            .unwrap();
+        let (all, faults) = MaterialsByHand::load(&files, "maps/x.bsp");
+        assert_eq!(faults.len(), 1, "{faults:?}");
+        assert!(faults[0].starts_with("scripts/b.materials: line 2: unknown word"));
+        let finish = all.finish("ab");
+        assert_eq!((finish.roughness, finish.metal), (Some(0.2), Some(1.0)));
+        let unmatched = all.unmatched("maps/x.bsp", &["ab", "c"]);
+        assert_eq!(
+            unmatched,
+            ["maps/x.materials: line 3: no material matches q*"]
+        );
+    }
+}
