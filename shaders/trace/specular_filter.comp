@@ -19,10 +19,8 @@ void main() {
     vec4 place = place_read(pixel);
     vec3 normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.images.surface], pixel).y);
     float tolerance = 0.1 + 6.0 * place.w * VIEW.camera.pixel_spread;
-    // tangent of the lobe's half width, then its footprint as seen from the camera (section 26.5.3)
-    float alpha = own.roughness * own.roughness;
-    float spread = alpha * own.away / max((own.away + place.w) * VIEW.camera.pixel_spread, 1.0e-6);
-    float radius = clamp(0.25 * spread / sqrt(max(own.frames * 0.25, 0.25)), 0.0, MOST_RADIUS);
+    float radius = 0.5 * lobe_radius(own.roughness, own.away, place.w);
+    radius = clamp(radius / sqrt(max(own.frames * 0.25, 0.25)), 0.0, MOST_RADIUS);
     vec3 sum = own.light;
     float total = 1.0;
     if (radius >= 1.0) {

@@ -11,6 +11,9 @@
 // Most frames in the mean.
 const float SPECULAR_FRAMES = 24.0;
 
+// Largest number of frames that a texel holds, in steps of an eighth.
+const float FRAME_CODES = 255.0 / 8.0;
+
 // Light of a pixel, before the reflectance, for the next frame.
 struct SpecularTexel {
     vec3 light;
@@ -20,14 +23,14 @@ struct SpecularTexel {
 };
 
 void specular_texel_write(uint image, ivec2 pixel, SpecularTexel t, float dither) {
-    uint codes = packUnorm4x8(vec4(t.frames / 255.0, t.roughness, 0.0, 0.0)) & 0xFFFFu;
+    uint codes = packUnorm4x8(vec4(t.frames / FRAME_CODES, t.roughness, 0.0, 0.0)) & 0xFFFFu;
     imageStore(uimages_rg32ui[image], pixel, uvec4(pack_light(finite_light(t.light), dither), codes | packHalf2x16(vec2(0.0, t.away)), 0, 0));
 }
 
 SpecularTexel specular_texel_read(uint image, ivec2 pixel) {
     uvec2 texel = imageLoad(uimages_rg32ui[image], pixel).xy;
     vec2 codes = unpackUnorm4x8(texel.y).xy;
-    return SpecularTexel(unpack_light(texel.x), round(codes.x * 255.0), codes.y, unpackHalf2x16(texel.y).y);
+    return SpecularTexel(unpack_light(texel.x), codes.x * FRAME_CODES, codes.y, unpackHalf2x16(texel.y).y);
 }
 
 float roughness_of(Gloss gloss) { return sqrt(gloss.alpha); }
@@ -38,6 +41,13 @@ float likeness(vec4 place, vec3 normal, float roughness, vec4 other, vec3 other_
     if (other.w < 0.0 || abs(dot(other.xyz - place.xyz, normal)) > tolerance || abs(other_roughness - roughness) > 0.1) return 0.0;
     float apart = 1.0 - dot(normal, other_normal);
     return exp(-apart / max(0.5 * roughness * roughness, 2.0e-4));
+}
+
+// Radius of a lobe on the screen, pixels: the tangent of its half width times the part of the way to the camera that
+// spreads it (Deferred Hybrid Path Tracing, section 26.5.3).
+float lobe_radius(float roughness, float away, float view_distance) {
+    float alpha = roughness * roughness;
+    return 0.5 * alpha * away / max((away + view_distance) * VIEW.camera.pixel_spread, 1.0e-6);
 }
 
 // Unit vector along the ray of a pixel of the last frame.

@@ -1,8 +1,8 @@
 #version 460
 // Specular light of each pixel: the mean of the paths around it, weighted by likeness, joined with the light of earlier
 // frames. What a smooth surface reflects moves like a point behind it (the virtual hit point: Deferred Hybrid Path Tracing,
-// Ray Tracing Gems, section 26.5), so that the history comes from where the last frame's camera saw that point. It is
-// clamped to the range of the paths around.
+// Ray Tracing Gems, section 26.5), so that the history comes from where the last frame's camera saw that point. Changes
+// of diffuse light shorten it; while something moves, it is clamped to the range of the paths around.
 #include "trace/specular_filter.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -50,8 +50,11 @@ void main() {
     vec3 face = unpack_normal(surface.x), normal = unpack_normal(surface.y);
     float tolerance = 0.1 + 6.0 * place.w * VIEW.camera.pixel_spread;
     ivec2 cell = pixel / CELL, cells = (ivec2(VIEW.width, VIEW.height) + CELL - 1) / CELL;
-    vec3 sum = vec3(0.0), squares = vec3(0.0), fallback = vec3(0.0);
-    float total = 0.0, away = 0.0;
+    vec3 sum = vec3(0.0), mean = vec3(0.0), squares = vec3(0.0);
+    float total = 0.0, alike = 0.0, away = 0.0;
+    // a lobe that is sharp on the screen takes the pixel's own path, which it has in one of four frames; a wide one all nine
+    float radius = lobe_radius(roughness, min(gloss_read(subsample_pixel(cell)).away, 4096.0), place.w);
+    float reach = clamp(0.25 * radius * radius, 0.2, 8.0);
     for (int i = 0; i < 9; i++) {
         ivec2 at = cell + ivec2(i % 3 - 1, i / 3 - 1);
         if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, cells))) continue;
@@ -61,12 +64,13 @@ void main() {
         vec3 other_normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.images.surface], traced).y);
         vec2 off = vec2(pixel - traced);
         float weight = likeness(place, normal, roughness, place_read(traced), other_normal, roughness_of(other.gloss), tolerance);
-        // a sharp lobe takes its own cell's path, a wide one all nine
-        weight *= exp(-dot(off, off) / mix(1.0, 8.0, min(roughness / 0.3, 1.0))) + 1.0e-4;
         if (!(weight > 0.0)) continue;
         vec3 light = light_read(VIEW.images.specular_light, traced);
-        sum += light * weight;
+        mean += light * weight;
         squares += light * light * weight;
+        alike += weight;
+        weight *= exp(-dot(off, off) / reach) + 1.0e-4;
+        sum += light * weight;
         away += min(other.away, 4096.0) * weight;
         total += weight;
     }
@@ -94,12 +98,20 @@ void main() {
         SpecularTexel old = SpecularTexel(vec3(0.0), 0.0, roughness, 0.0);
         if (!moved) old = history_at(seen, plane, roughness);
         if (old.frames > 0.0 && total > 0.0) {
-            vec3 deviation = sqrt(max(squares / total - sum * sum, 0.0));
-            vec3 clamped = clamp(old.light, sum - RANGE * deviation - 0.02, sum + RANGE * deviation + 0.02);
+            mean /= alike;
+            vec3 deviation = sqrt(max(squares / alike - mean * mean, 0.0));
+            bool gradients = (DENOISE.flags & DENOISE_GRADIENTS) != 0, rests = gradients && VIEW.motion.still != 0;
+            vec3 clamped = rests ? old.light : clamp(old.light, mean - RANGE * deviation - 0.02, mean + RANGE * deviation + 0.02);
             // a clamp that changes much shortens the history
             float kept = 1.0 - clamp(luminance(abs(clamped - old.light)) / max(luminance(max(old.light, sum)), 1.0e-4), 0.0, 1.0);
-            texel.frames = min(old.frames * kept + 1.0, SPECULAR_FRAMES);
-            texel.light = mix(mix(clamped, old.light, 0.5 * kept), sum, 1.0 / texel.frames);
+            if (gradients) {
+                // the light that changes here changes there, too
+                vec2 change = imageLoad(images_rg16f[DENOISE.gradient], pixel / STRATUM).xy;
+                kept *= 1.0 - clamp(max(change.x, change.y), 0.0, 1.0);
+            }
+            float fresh = min(total, 1.0);
+            texel.frames = min(old.frames * kept + fresh, SPECULAR_FRAMES);
+            texel.light = mix(mix(clamped, old.light, 0.5 * kept), sum, min(fresh / texel.frames, 1.0));
         } else if (old.frames > 0.0) texel = SpecularTexel(old.light, old.frames, roughness, old.away);
     }
     specular_texel_write(VIEW.images.fresh_specular, pixel, texel, dither(pixel, DITHER_SPECULAR));

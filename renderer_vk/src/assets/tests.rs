@@ -538,3 +538,56 @@ fn plain_materials_are_one_image_under_light() {
     let flags: Vec<u32> = stages.iter().map(|s| s.flags & flags).collect();
     assert_eq!(flags, [c::STAGE_BAKED_LIGHT, c::STAGE_LIGHT_STYLE, 0]);
 }
+
+#[test]
+fn files_of_materials_change_and_restore_materials() {
+    use relight::materials::by_hand::MaterialsByHand;
+    let mut game = game();
+    let [wall, shiny, water, sky] = ["t/wall", "t/shiny", "t/water", "t/sky"]
+        .map(|name| game.find(name, LightmapClass::Page, true));
+    let flags = |game: &Registration| {
+        [wall, shiny, water, sky].map(|index| game.materials.get(index).flags)
+    };
+    let before = flags(&game);
+    assert!(!game.materials.has_gloss());
+    let set = |game: &mut Registration, text: &str| {
+        let (file, wrong) = MaterialsByHand::parse(text);
+        assert_eq!(wrong, []);
+        game.materials.set_by_hand(file, &mut game.textures)
+    };
+    let faults = set(
+        &mut game,
+        "rough t/* 0.4\nmetal t/wall 0.5\nplain t/shiny\nnormals t/wall t/nothing\nsurface t/w* t/a",
+    );
+    assert_eq!(faults.len(), 1, "{faults:?}");
+    assert!(faults[0].contains("t/wall") && faults[0].contains("t/nothing"));
+    let material = game.materials.get(wall);
+    assert_eq!(material.flags, before[0] | c::MATERIAL_ROUGH);
+    assert_eq!(
+        (material.specular.roughness, material.specular.metal),
+        (0.4, 0.5)
+    );
+    assert_ne!(material.specular.map, c::NO_TEXTURE);
+    // plain forgets the lines before it; what has no body stays as it is
+    let plain = before[1] & !c::MATERIAL_REFLECTS | c::MATERIAL_PLAIN;
+    assert_eq!(flags(&game)[1..], [plain, before[2], before[3]]);
+    assert!(game.materials.has_gloss());
+    // later materials have the files, too
+    let later = game.find("t/plain", LightmapClass::Page, true);
+    assert_ne!(game.materials.get(later).flags & c::MATERIAL_ROUGH, 0);
+    // a grey image is no normal map
+    let faults = set(
+        &mut game,
+        "normals t/wall t/a\nmirror t/wall 0.5 0.5 0.5\nglass t/shiny 1.5 1 0.5 1",
+    );
+    assert_eq!(faults.len(), 1, "{faults:?}");
+    assert!(faults[0].contains("no normal map"));
+    let glass = game.materials.get(shiny);
+    assert_eq!(glass.dielectric.index, 1.5);
+    assert_ne!(glass.flags & c::MATERIAL_TRANSLUCENT, 0);
+    assert_eq!(flags(&game)[0], before[0] | c::MATERIAL_REFLECTS);
+    // without lines everything is as before
+    assert_eq!(set(&mut game, ""), [""; 0]);
+    assert_eq!(flags(&game), before);
+    assert!(!game.materials.has_gloss());
+}

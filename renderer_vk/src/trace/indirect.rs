@@ -61,7 +61,15 @@ pub fn record_specular(
         passes.run_numbered(Pass::SpecularLight, 0, part)?;
         trace_path(passes, transport, transport.specular_bounces, part)?;
     }
-    if passes.facts.subsampled {
+    Ok(())
+}
+
+/// Records the filter of that light, if one of 2 × 2 pixels has gathered it; after the denoiser, whose gradients it reads.
+///
+/// # Errors
+/// Out of memory, or the driver refuses a pipeline.
+pub fn filter_specular(passes: &mut FramePasses<'_>) -> Result<(), Error> {
+    if passes.facts.gloss && passes.facts.subsampled {
         passes.run(Pass::SpecularTemporal)?;
         passes.run(Pass::SpecularFilter)?;
     }

@@ -326,17 +326,6 @@ passes! {
         writes: &[BounceLights],
         counter: Some(t::COUNT_SPECULAR),
     }
-    /// Joins the specular light of the paths around a pixel with that of earlier frames.
-    SpecularTemporal = "trace_specular_filter", Compute(&shaders::TRACE_SPECULAR_TEMPORAL_COMP), Traced {
-        reads: &[GBuffer, Positions, Normals, GlossSurfaces, GlossLight],
-        may_read: &[GradientPixels],
-        writes: &[GlossHistory],
-    }
-    /// Smooths it by the size of the lobe on the screen.
-    SpecularFilter = "trace_specular_filter", Compute(&shaders::TRACE_SPECULAR_FILTER_COMP), Traced {
-        reads: &[Positions, Normals, GlossHistory],
-        writes: &[GlossLight],
-    }
     /// Interpolates bounced light to the pixels that did not gather it.
     BounceUpsample = "trace_bounce_upsample", Compute(&shaders::TRACE_BOUNCE_UPSAMPLE_COMP), Cells {
         reads: &[GBuffer, Positions, Normals, IndirectLight],
@@ -395,6 +384,17 @@ passes! {
     SparseFilter = "trace_sparse_filter", Compute(&shaders::TRACE_SPARSE_FILTER_COMP), Traced {
         reads: &[FreshLight, DepthGradient],
         writes: &[LightHistory, DirectLight],
+    }
+    /// Joins the specular light of the paths around a pixel with that of earlier frames.
+    SpecularTemporal = "trace_specular_filter", Compute(&shaders::TRACE_SPECULAR_TEMPORAL_COMP), Traced {
+        reads: &[GBuffer, Positions, Normals, GlossSurfaces, GlossLight],
+        may_read: &[GradientPixels, Gradients],
+        writes: &[GlossHistory],
+    }
+    /// Smooths it by the size of the lobe on the screen.
+    SpecularFilter = "trace_specular_filter", Compute(&shaders::TRACE_SPECULAR_FILTER_COMP), Traced {
+        reads: &[Positions, Normals, GlossHistory],
+        writes: &[GlossLight],
     }
     /// Light at the points in fog.
     FogLight = "trace_fog", Rays(&shaders::TRACE_FOG_LIGHT), FogCells {

@@ -351,6 +351,7 @@ impl ViewTracer {
             indirect::record_specular(passes, &params.transport)?;
         }
         self.denoiser.filter(passes, &targets.scratch)?;
+        indirect::filter_specular(passes)?;
         // after the denoiser, which is the last to read the positions that the filtered light overwrites
         self.fog.record(passes, &targets.fog)?;
         self.counters.end(passes.rec)?;

@@ -4,11 +4,11 @@ use glam::Vec3;
 use shaders::trace_types::{SkyRecord, constants as t};
 use shaders::types::{Specular, constants as c};
 
-use super::bounces::{furnace, seen};
+use super::bounces::{by_each_way, furnace, seen};
 use super::harness::{
     Gpu, Scene, bounced, encode, floor_at, gpu_tests, rectangle, reference, stage, through_byte,
 };
-use crate::settings::Settings;
+use crate::settings::{DenoiserChoice, Settings};
 
 gpu_tests! {
     any: [
@@ -17,6 +17,8 @@ gpu_tests! {
         a_smooth_metal_is_a_mirror,
         a_sun_shows_in_a_rough_floor,
         rough_surfaces_light_others,
+        live_frames_have_the_same_mean,
+        live_light_comes_to_rest,
     ],
 }
 
@@ -193,5 +195,38 @@ fn rough_surfaces_light_others(gpu: &mut Gpu) {
             println!("roughness {roughness}, {bounces} bounces: {mean} {exact}");
             assert!((mean / exact - 1.0).abs() < 0.005, "{roughness}, {bounces}");
         }
+    }
+}
+
+fn live_frames_have_the_same_mean(gpu: &mut Gpu) {
+    let scene = floor_below_a_lamp(0.5);
+    let [exact, live] = by_each_way(gpu, &scene, &bounced(1), 64).map(|mean| mean.x);
+    println!("{exact} {live}");
+    assert!((live / exact - 1.0).abs() < 0.02, "{exact} {live}");
+}
+
+fn live_light_comes_to_rest(gpu: &mut Gpu) {
+    // each pixel has traced eight paths in 32 frames; edges differ, because only the mean of many frames jitters pixels
+    let live = Settings {
+        rt_accumulate: false,
+        rt_denoiser: DenoiserChoice::ASvgf,
+        rt_taa: false,
+        ..bounced(1)
+    };
+    for roughness in [0.1, 0.3, 0.6] {
+        let scene = floor_below_a_lamp(roughness);
+        let (exact, _) = gpu.render(&scene, &bounced(1), 512);
+        let error = |pixels: &[Vec3]| {
+            let squares = (pixels.iter().zip(&exact)).map(|(a, b)| (a.x - b.x).powi(2));
+            (squares.sum::<f32>() / 256.0).sqrt() / mean_of(&exact)
+        };
+        let mut errors = Vec::new();
+        let mut watch = |_, pixels: &[Vec3]| errors.push(error(pixels));
+        gpu.render_watched(&scene, &live, 32, |_, _| {}, Some(&mut watch));
+        println!("{roughness}: {} {}", errors[0], errors[31]);
+        assert!(
+            errors[31] < 0.5 * errors[0] || errors[31] < 0.1,
+            "{errors:?}"
+        );
     }
 }
