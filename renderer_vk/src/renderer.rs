@@ -456,17 +456,20 @@ impl Renderer {
         if let (Some(world), Some(assets)) = (&mut self.world, &mut self.assets) {
             let settings = &self.settings;
             let lit = world.light_by(settings.rt_lights, assets, self.calibrations.as_ref());
-            if lit || self.trace.is_none() {
+            let made = lit || self.trace.is_none();
+            if made {
                 let tracer = Tracer::of(self.device.info(), settings.rt_tracer);
                 let kept = self.trace_passes.take().filter(|p| p.tracer() == tracer);
                 let new = || Arc::new(PassSet::new(&self.device, tracer));
                 let passes = self.trace_passes.insert(kept.unwrap_or_else(new));
                 self.trace = Some(TraceLook::new(passes, world, assets)?);
-                give_back_freed_memory();
             }
             if let (Some(passes), Some(look)) = (&self.trace_passes, &self.trace) {
                 // in each frame, because settings and materials may have changed
                 compile_ahead(passes, settings, look.needs(world, assets))?;
+            }
+            if made {
+                give_back_freed_memory();
             }
         }
         Ok(self.trace.is_some())

@@ -224,9 +224,6 @@ fn live_light_comes_to_rest(gpu: &mut Gpu) {
         let mut watch = |_, pixels: &[Vec3]| errors.push(error(pixels));
         gpu.render_watched(&scene, &live, 32, |_, _| {}, Some(&mut watch));
         println!("{roughness}: {} {}", errors[0], errors[31]);
-        assert!(
-            errors[31] < 0.5 * errors[0] || errors[31] < 0.1,
-            "{errors:?}"
-        );
+        assert!(errors[31] < 0.7 * errors[0], "{errors:?}");
     }
 }
