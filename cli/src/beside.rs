@@ -51,11 +51,13 @@ mod tests {
         let map = folder.path().join("room.bsp");
         assert!(beside(&map).unwrap().list("maps", ".lights").is_empty());
         std::fs::write(folder.path().join("room.lights"), "x").unwrap();
+        std::fs::write(folder.path().join("room.materials"), "x").unwrap();
         std::fs::create_dir(folder.path().join("room")).unwrap();
         std::fs::write(folder.path().join("room/lm_0000.tga"), "y").unwrap();
         std::fs::write(folder.path().join("room/notes.txt"), "z").unwrap();
         let found = beside(&map).unwrap();
         assert!(found.exists("maps/room.lights"));
+        assert!(found.exists("maps/room.materials"));
         assert!(found.exists("maps/room/lm_0000.tga"));
         assert!(!found.exists("maps/room/notes.txt"));
     }

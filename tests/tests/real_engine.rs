@@ -234,11 +234,25 @@ fn lights_by_hand_light_the_traced_look() {
     commands.extend(start_map(map));
     commands.extend([format!("setviewpos {camera}"), "set r_rt 1".to_string()]);
     commands.extend(picture(camera, 8, "shot"));
-    let files = vec![(format!("maps/{map}.lights"), lights.into())];
+    set(&mut commands, &["rt_reload", "wait 4"]);
+    let materials = "rough textures/* 0.4\nrough textures/* 7\n";
+    let files = vec![
+        (format!("maps/{map}.lights"), lights.into()),
+        (format!("maps/{map}.materials"), materials.into()),
+    ];
     let outcome = run_with("vk", (160, 120), commands, files);
     outcome.assert_clean();
     let printed = format!("maps/{map}.lights: line 7: ");
     assert!(outcome.log.contains(&printed), "{}", outcome.log_end());
+    // read by the first traced frame, and once more by the command
+    let printed = format!("maps/{map}.materials: line 2: roughness is from 0 to 1");
+    let read = outcome.log.matches(&printed).count();
+    assert_eq!(read, 2, "{}", outcome.log_end());
+    assert!(
+        outcome.log.contains("rt_reload: read"),
+        "{}",
+        outcome.log_end()
+    );
     let picture = outcome.picture("shot");
     keep_picture(picture, "lights-by-hand");
     let mean = |channel: usize| {

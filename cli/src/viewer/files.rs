@@ -117,13 +117,6 @@ impl Viewer {
                     Some("the file of lights has changed on disk; yours are not saved".to_owned());
             }
             Some(Changed::Lights) => self.reload_lights(),
-            Some(Changed::Materials) => {
-                // a pack's files may be open, so that changes in them need them again
-                self.message = Some(match self.renderer.read_by_hand_again() {
-                    Ok(_) => "materials reloaded".to_owned(),
-                    Err(e) => e.to_string(),
-                });
-            }
             Some(Changed::Map) => self.reload(),
         }
         collecting

@@ -17,8 +17,19 @@ use crate::chosen::ChosenMap;
 use crate::scripts::load_scripts;
 
 /// Files that a map is made of.
-const WATCHED: [&str; 11] = [
-    "bsp", "lights", "shader", "mtr", "tga", "jpg", "jpeg", "png", "pk3", "pcx", "skin",
+const WATCHED: [&str; 12] = [
+    "bsp",
+    "lights",
+    "materials",
+    "shader",
+    "mtr",
+    "tga",
+    "jpg",
+    "jpeg",
+    "png",
+    "pk3",
+    "pcx",
+    "skin",
 ];
 
 /// Changes are collected for this long: programs write files in several steps.
@@ -208,8 +219,6 @@ fn find(
 pub enum Changed {
     /// Lights by hand alone.
     Lights,
-    /// Materials by hand alone.
-    Materials,
     /// The map, its materials or its images.
     Map,
 }
@@ -277,7 +286,6 @@ fn kind(path: &Path) -> Option<Changed> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();
     match extension.as_str() {
         "lights" => Some(Changed::Lights),
-        "materials" => Some(Changed::Materials),
         other => WATCHED.contains(&other).then_some(Changed::Map),
     }
 }
@@ -322,6 +330,9 @@ mod tests {
         assert_eq!(wait(&mut changes), Some(Changed::Lights));
         std::fs::write(folder.path().join("room.lights"), "point").unwrap();
         std::fs::write(&map, "z").unwrap();
+        assert_eq!(wait(&mut changes), Some(Changed::Map));
+        // a map outside of a game has them in memory, so that they are read with the map
+        std::fs::write(folder.path().join("room.materials"), "rough").unwrap();
         assert_eq!(wait(&mut changes), Some(Changed::Map));
         assert_eq!(changes.take(), (None, false));
     }

@@ -427,4 +427,47 @@ spot 1 2 3 100 1 1 1 1 2 3 30
         let all = lit.light_lists.row(-1);
         assert_eq!(all.len(), lit.lights.len() + 2);
     }
+
+    #[test]
+    fn files_of_materials_state_light_that_files_of_lights_override() {
+        let mut files = sample::files().unwrap();
+        let load = |files: &crate::files::MemoryFiles| {
+            let (materials, _) = Materials::load(files);
+            let options = Options {
+                calibrate: None,
+                ..Options::default()
+            };
+            RelitWorld::load(files, &materials, sample::MAP, options).unwrap()
+        };
+        let plain = load(&files);
+        let lamp = plain.surfaces[plain.lights[0].surface as usize].material;
+        let name = plain.materials[lamp as usize].name.clone();
+        let of_lamp = |world: &RelitWorld| -> Vec<Vec3> {
+            let lit = |l: &&TriangleLight| world.surfaces[l.surface as usize].material == lamp;
+            world
+                .lights
+                .iter()
+                .filter(lit)
+                .map(|l| l.radiance)
+                .collect()
+        };
+        let path = crate::materials::by_hand::materials_file(&plain.name);
+        files
+            .insert(&path, format!("emit {name} 51 2 1 1\nemit {name} x\n"))
+            .unwrap();
+        let lit = load(&files);
+        let expected = Vec3::new(1.0, 0.5, 0.5) * 51.0 * SURFACE_LIGHT_RADIANCE;
+        assert!(!of_lamp(&lit).is_empty());
+        assert!(
+            of_lamp(&lit)
+                .iter()
+                .all(|r| (*r - expected).length() < 1e-5)
+        );
+        assert_eq!(lit.warnings.len(), 1, "{:?}", lit.warnings);
+        assert!(lit.warnings[0].contains(".materials: line 2"));
+        files
+            .insert(&plain.lights_file(), format!("material {name} 0 1 1 1\n"))
+            .unwrap();
+        assert!(of_lamp(&load(&files)).is_empty());
+    }
 }
