@@ -51,8 +51,7 @@ impl LitMaps {
         if self.no_calibration {
             world.measure_materials(&*files);
         }
-        world.emit_by_hand(&*files);
-        world.light_by_hand(&*files);
+        world.read_by_hand(&*files);
         for warning in &world.warnings {
             log::warn!("{warning}");
         }

@@ -118,22 +118,26 @@ pub unsafe extern "C" fn load_world(name: *const c_char) {
             }
             renderer.load_world(&name).map_err(Failure::from)
         })?;
-        if let Some(engine) = engine::current()
-            && let Some(line) = unread_lights(engine, &name)
-        {
-            engine.say(&line);
+        if let Some(engine) = engine::current() {
+            for file in [
+                relight::light::lights_file(&name),
+                relight::materials::by_hand::materials_file(&name),
+            ] {
+                if let Some(line) = unread(engine, &file) {
+                    engine.say(&line);
+                }
+            }
         }
         Ok(())
     });
 }
 
-/// What to print where the player has a file of lights that the engine does not read, as on a pure server.
-fn unread_lights(engine: Engine, map: &str) -> Option<String> {
-    let lights = relight::light::lights_file(map);
-    let unread = engine.home_has(&lights) && engine.read_file(&valid_game_path(&lights)?).is_none();
+/// What to print where the player has a file that the engine does not read, as on a pure server.
+fn unread(engine: Engine, file: &str) -> Option<String> {
+    let unread = engine.home_has(file) && engine.read_file(&valid_game_path(file)?).is_none();
     unread.then(|| {
         format!(
-            "{lights} is not used: this server reads packs only. Give \\sv_pure 0 before the map starts, or put the \
+            "{file} is not used: this server reads packs only. Give \\sv_pure 0 before the map starts, or put the \
              file into a .pk3\n"
         )
     })

@@ -265,8 +265,7 @@ impl RelitWorld {
             calibrate(&mut world, calibration);
         }
         if options.by_hand {
-            world.emit_by_hand(files);
-            world.light_by_hand(files);
+            world.read_by_hand(files);
         }
         begin(Stage::Done);
         world

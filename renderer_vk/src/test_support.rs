@@ -83,7 +83,15 @@ impl ImageSource for FakeTextures {
         (page < self.lightmaps).then(|| 1001 + u32::try_from(page).unwrap())
     }
 
+    /// Grey, but for images of numbers, whose meaning depends on their mean.
     fn mean(&self, texture: u32) -> Vec4 {
+        let named = self.by_name.iter().find(|(_, i)| **i == Some(texture));
+        if let Some((name, _)) = named
+            && self.flags.get(name).is_some_and(|flags| flags.data)
+            && let Ok(Some((picture, _))) = image::load(&*self.files, name)
+        {
+            return picture.mean_linear().extend(1.0);
+        }
         if texture == WHITE {
             Vec4::ONE
         } else {

@@ -127,9 +127,7 @@ pub struct Specular {
     pub metal: f32,
     /// Reflectance at normal incidence of the part that is no metal.
     pub reflectance: f32,
-    /// `SPECULAR_MAP_*`: meaning of the channels of `map`.
-    pub map_kind: u32,
-    /// Bindless texture that varies the values above; `NO_TEXTURE`: none.
+    /// Bindless texture of factors of roughness (green) and metal (blue); `NO_TEXTURE`: none.
     pub map: u32,
     /// Bindless texture of normals in the tangent space of the texture coordinates. Of `MATERIAL_NORMALS` alone.
     pub normals: u32,

@@ -113,7 +113,7 @@ vec3 listed_radiance(SurfacePoint p, vec3 direction, float away, uint chain) {
     EmittedLight light = EmittedLights(VIEW.lights.emitted).at[p.triangle.instance];
     vec3 radiance = light.radiance * VIEW.lights.scale;
     if ((chain & CHAIN_BITS) != CHAIN_ROUGH) return radiance;
-    if (light.met == 0) return vec3(0.0);
+    if (light.hittable == 0) return vec3(0.0);
     return radiance * ray_share(chain_density(chain), triangle_density(away, abs(dot(p.face_normal, direction)), triangle_area(p)));
 }
 
@@ -134,8 +134,8 @@ vec3 sun_radiance(vec3 direction, uint chain) {
 // lobe.
 const uint ROUGH_CANDIDATES = 4;
 
-// A light sample of a rough vertex, by resampled importance sampling of what it reflects along the path. `both`: a ray by
-// the surface's distribution follows, and counts its share.
+// A light sample of a rough vertex, selected in proportion to the light that the lobe reflects back along the path (resampled
+// importance sampling). `both`: a ray sampled from the lobe follows, and counts its share.
 LightSample rough_light(PathVertex v, bool both) {
     LightSet set = lights_at(v.position, v.face_normal, v.normal);
     LightSample selected = no_light();
@@ -186,8 +186,8 @@ bool chooses_mirror(SurfacePoint p, vec3 direction, Layer layer, inout vec3 thro
 const float LEAST_LAST_ALPHA = 0.04;
 
 // Decides whether a path goes on by the specular part of a rough surface, and divides its throughput by the probability.
-bool chooses_gloss(vec3 shine, vec3 lit, inout vec3 throughput) {
-    float specular = max_component(throughput * shine), diffuse = max_component(throughput * lit);
+bool chooses_gloss(vec3 lobe_albedo, vec3 lit, inout vec3 throughput) {
+    float specular = max_component(throughput * lobe_albedo), diffuse = max_component(throughput * lit);
     float chance = specular / max(specular + diffuse, 1.0e-20);
     bool chosen = rng_next() < chance;
     throughput /= chosen ? max(chance, 1.0e-20) : 1.0 - chance;
@@ -229,8 +229,8 @@ bool bounce_shade(Hit hit, vec3 origin, uint chain, inout vec3 throughput, inout
     Footprint seen = round_footprint(t * BOUNCE_SPREAD);
     Layer layer = evaluate_stages(p, seen);
     p.normal = mapped_normal(p, material, seen);
-    vec3 shine;
-    Gloss gloss = take_gloss(p, material, seen, direction, layer.lit, shine);
+    vec3 lobe_albedo;
+    Gloss gloss = take_gloss(p, material, seen, direction, layer.lit, lobe_albedo);
     if (!in_lists && p.kind != KIND_TRANSLUCENT) sum += throughput * max(layer.emission, 0.0);
     v.face_normal = dot(p.face_normal, direction) > 0.0 ? -p.face_normal : p.face_normal;
     v.normal = dot(p.normal, v.face_normal) < 0.0 ? -p.normal : p.normal;
@@ -245,8 +245,8 @@ bool bounce_shade(Hit hit, vec3 origin, uint chain, inout vec3 throughput, inout
     if (p.kind == KIND_TRANSLUCENT) return false;
     v.position = shading_position(p, v.face_normal);
     vec3 lit = clamp(layer.lit, 0.0, 1.0);
-    if ((VIEW.flags & VIEW_ACCUMULATE) == 0) lit = min(lit + shine, 1.0); // live frames have one lobe behind the first surface
-    else if (is_glossy(gloss) && chooses_gloss(shine, lit, throughput)) {
+    if ((VIEW.flags & VIEW_ACCUMULATE) == 0) lit = min(lit + lobe_albedo, 1.0); // live frames have one lobe behind the first surface
+    else if (is_glossy(gloss) && chooses_gloss(lobe_albedo, lit, throughput)) {
         v.chain = CHAIN_ROUGH;
         v.gloss = gloss;
         if (LAST_BOUNCE != 0) v.gloss.alpha = max(gloss.alpha, LEAST_LAST_ALPHA);

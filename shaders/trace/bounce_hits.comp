@@ -30,7 +30,7 @@ void main() {
         else if (is_specular() || VIEW.transport.mirror_count > 0) bounce_origin_read(cell, b.found);
         if (is_specular() && push.number == 0) {
             // the filter of live frames reprojects by this distance
-            gloss.away = hit.geometry == NO_HIT ? 0.0 : surface_distance(hit, origin);
+            gloss.hit_distance = hit.geometry == NO_HIT ? 0.0 : surface_distance(hit, origin);
             gloss_write(pixel, gloss);
         }
         onward = hit.geometry != NO_HIT && bounce_shade(hit, origin, chain, throughput, b.found, v);

@@ -16,7 +16,7 @@ ivec2 bounce_pixel(ivec2 cell) {
 }
 
 // Whether the path gathers specular light of the pixel's surface; otherwise diffuse light.
-bool is_specular() { return (push.part & PART_SPECULAR) != 0; }
+bool is_specular() { return HAS_GLOSS != 0 && (push.part & PART_SPECULAR) != 0; }
 
 // Number of the path, of those that the pixel traces in this frame for this light.
 uint path_number() { return (push.part & ~PART_SPECULAR) >> PART_PATH_SHIFT; }

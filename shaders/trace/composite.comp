@@ -35,9 +35,10 @@ struct Shown {
     vec3 albedo;
     vec3 light;
     vec3 front;
+    vec3 gloss; // specular light that the surface reflects
 };
 
-vec3 radiance_of(Shown s) { return s.is_lit ? s.albedo * s.light + s.front : s.front; }
+vec3 radiance_of(Shown s) { return (s.is_lit ? s.albedo * s.light + s.front : s.front) + s.gloss; }
 
 Shown shown(ivec2 pixel) {
     GBufferPixel g;
@@ -48,7 +49,7 @@ Shown shown(ivec2 pixel) {
     s.is_lit = is_lit_read(pixel);
     s.albedo = g.albedo;
     s.light = s.is_lit ? light_of(pixel) : vec3(0.0);
-    s.front += shown_gloss(pixel);
+    s.gloss = shown_gloss(pixel);
     return s;
 }
 
@@ -65,7 +66,8 @@ bool other_side(ivec2 pixel, float field, out vec3 other, out vec3 whole) {
     GBufferPixel own;
     shown_read(VIEW.images.other, pixel, own);
     own.front *= exp2(-VIEW.exposure.base);
-    bool is_lit = max_component(own.albedo) > 0.0;
+    // metal has no albedo: what has neither that nor a front takes the light of any neighbour
+    bool is_lit = max_component(own.albedo) > 0.0, any_kind = HAS_GLOSS != 0 && !is_lit && own.front == vec3(0.0);
     // horizontal and vertical pairs: sums over neighbours with a matching surface, and over all
     vec3 sums[2] = vec3[](vec3(0.0), vec3(0.0)), all_sum = vec3(0.0);
     float counts[2] = float[](0.0, 0.0), contrast[2] = float[](0.0, 0.0), any_count = 0.0, whole_count = 0.0;
@@ -85,8 +87,8 @@ bool other_side(ivec2 pixel, float field, out vec3 other, out vec3 whole) {
         }
         all_sum += seen;
         any_count += 1.0;
-        if (s.is_lit != is_lit) continue;
-        vec3 value = own.albedo * s.light + own.front + fog;
+        if (s.is_lit != is_lit && !any_kind) continue;
+        vec3 value = own.albedo * s.light + own.front + s.gloss + fog;
         sums[i >> 1] += value;
         counts[i >> 1] += 1.0;
         contrast[i >> 1] += (i & 1) == 0 ? luminance(value) : -luminance(value);

@@ -86,15 +86,17 @@ struct SeenLayer {
     vec3 own;
     float clear; // part of its light that fog leaves
     Gloss gloss;
-    vec3 shine; // specular albedo
+    vec3 lobe_albedo; // specular albedo
 };
 
-// `last`: the point's position in the last frame; `shine`: the part of the light around that the gloss shows.
-void keep_lit(SurfacePoint p, vec3 lit, vec3 shine, SeenLayer layer, Path path, LastPlace last, float t) {
-    float weight = max_component(lit + shine);
+// `last`: the point's position in the last frame; `lit`, `lobe_albedo`: factors of the diffuse and of the specular light.
+void keep_lit(SurfacePoint p, vec3 lit, vec3 lobe_albedo, SeenLayer layer, Path path, LastPlace last, float t) {
+    float weight = max_component(lit + lobe_albedo);
     if (!(weight > 0.0)) return;
     if (abs(dot(lit_plane.xyz, p.face_normal)) > 0.99 && abs(dot(lit_plane.xyz, p.position) - lit_plane.w) < PAINT_DISTANCE) {
-        if (lit_kept) kept.albedo += lit;
+        if (!lit_kept) return;
+        kept.albedo += lit;
+        if (is_glossy(layer.gloss)) kept_gloss = GlossPixel(layer.gloss, kept_gloss.lobe_albedo + lobe_albedo, -path.direction, 0.0);
         return;
     }
     lit_plane = vec4(p.face_normal, dot(p.face_normal, p.position));
@@ -110,7 +112,7 @@ void keep_lit(SurfacePoint p, vec3 lit, vec3 shine, SeenLayer layer, Path path, 
     // the side that the path hits is lit
     kept.normal = dot(p.normal, kept.face_normal) < 0.0 ? -p.normal : p.normal;
     kept.albedo = lit;
-    kept_gloss = GlossPixel(layer.gloss, shine, -path.direction, 0.0);
+    kept_gloss = GlossPixel(layer.gloss, lobe_albedo, -path.direction, 0.0);
     kept.first_person = (instance_of(p.instance).flags & INSTANCE_FIRST_PERSON) != 0;
     kept_last = last;
     kept_bent = path.bent;
@@ -156,11 +158,11 @@ SeenLayer seen_layer(SurfacePoint p, Material material, Footprint seen, vec3 dir
     Layer part = Layer(bounded_albedo(material, linear_part(shown.lit)), vec3(0.0), linear_part(shown.through), linear_part(shown.reflected), vec3(0.0));
     vec3 own = part.lit * (shown_glow(material) + added_light(p));
     take_mirror(material, part);
-    vec3 shine;
-    Gloss gloss = take_gloss(p, material, seen, direction, part.lit, shine);
+    vec3 lobe_albedo;
+    Gloss gloss = take_gloss(p, material, seen, direction, part.lit, lobe_albedo);
     if (max_component(part.reflected) < MIN_REFLECTION) part.reflected = vec3(0.0);
     part.emission = linear_part(shown.emission + shown.haze);
-    return SeenLayer(part, max(shown.through, 0.0), own, linear_part(vec3(clear)).x, gloss, shine);
+    return SeenLayer(part, max(shown.through, 0.0), own, linear_part(vec3(clear)).x, gloss, lobe_albedo);
 }
 
 // Bound of the gain of traced light on layers where the engine shows hardly any light: their share of the displayed sum
@@ -193,8 +195,8 @@ vec3 light_shown(SurfacePoint p) {
 
 void add_layer(inout Path path, SurfacePoint p, SeenLayer layer, LastPlace last, float t) {
     vec3 lit = path.transmittance * layer.linear.lit, own = path.transmittance * layer.own;
-    vec3 glow = path.transmittance * layer.linear.emission, shine = path.transmittance * layer.shine;
-    bool glows = glow != vec3(0.0), is_lit = lit + shine != vec3(0.0);
+    vec3 glow = path.transmittance * layer.linear.emission, lobe_albedo = path.transmittance * layer.lobe_albedo;
+    bool glows = glow != vec3(0.0), is_lit = lit + lobe_albedo != vec3(0.0);
     bool alone = path.cover == vec3(1.0) && path.shown == vec3(0.0) && layer.cover == vec3(0.0) && !(glows && is_lit);
     vec3 gain = vec3(1.0);
     if (alone) {
@@ -202,12 +204,12 @@ void add_layer(inout Path path, SurfacePoint p, SeenLayer layer, LastPlace last,
     } else {
         if (glows) path.glow += path.weight * glow * share_display(path, encode_display(glow));
         if (is_lit) {
-            vec3 share = share_display(path, encode_display((lit + shine) * light_shown(p) + own));
+            vec3 share = share_display(path, encode_display((lit + lobe_albedo) * light_shown(p) + own));
             path.glow += path.weight * own * share;
             gain = min(share, path.cover * MOST_GAIN / display_slope(path.shown));
         }
     }
-    keep_lit(p, path.weight * lit * gain, path.weight * shine * gain, layer, path, last, t);
+    keep_lit(p, path.weight * lit * gain, path.weight * lobe_albedo * gain, layer, path, last, t);
     path.cover *= layer.cover;
     path.events++;
 }

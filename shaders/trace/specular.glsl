@@ -127,19 +127,9 @@ Gloss body_gloss(SurfacePoint p, Material material, Footprint footprint, out flo
         Lookups lookups = Lookups(vec2(0.0), 1.0, texture_lod(specular.map, p.texel_scale, footprint.width));
         map = texel_mean(specular.map, specular.sampler_index, p.stage.st, lookups);
     }
-    float roughness = specular.roughness;
-    vec3 reflectance = vec3(specular.reflectance);
-    if (specular.map_kind == SPECULAR_MAP_REFLECTANCE) {
-        if (specular.map != NO_TEXTURE) {
-            reflectance = decode_display(map.rgb) * specular.reflectance;
-            roughness = 1.0 - map.a * (1.0 - roughness);
-        }
-    } else {
-        roughness *= map.g;
-        metal *= map.b;
-    }
-    float rough = max(roughness, LEAST_ROUGHNESS);
-    return Gloss(reflectance, rough * rough);
+    float rough = max(specular.roughness * map.g, LEAST_ROUGHNESS);
+    metal *= map.b;
+    return Gloss(vec3(specular.reflectance), rough * rough);
 }
 
 // The shading normal of a point, on the side of its face: from the normal map, if the material has one. Tangents follow
@@ -170,22 +160,22 @@ vec3 mapped_normal(SurfacePoint p, Material material, Footprint footprint) {
 }
 
 // Gives the specular part of the light that reaches a layer to the result, and the rest to its diffuse part `lit`.
-// `direction`: of the ray that meets the point; `shine`: specular albedo.
-Gloss take_gloss(SurfacePoint p, Material material, Footprint footprint, vec3 direction, inout vec3 lit, out vec3 shine) {
-    shine = vec3(0.0);
+// `direction`: of the ray that meets the point; `lobe_albedo`: specular albedo.
+Gloss take_gloss(SurfacePoint p, Material material, Footprint footprint, vec3 direction, inout vec3 lit, out vec3 lobe_albedo) {
+    lobe_albedo = vec3(0.0);
     if (HAS_GLOSS == 0 || (material.flags & MATERIAL_ROUGH) == 0 || p.kind == KIND_TRANSLUCENT) return NO_GLOSS;
     float metal;
     Gloss body = body_gloss(p, material, footprint, metal);
     Gloss gloss = Gloss(mix(body.reflectance, clamp(lit, 0.0, 1.0), metal), body.alpha);
     vec3 face = dot(p.face_normal, direction) > 0.0 ? -p.face_normal : p.face_normal;
     GlossView view = gloss_view(dot(p.normal, face) < 0.0 ? -p.normal : p.normal, -direction);
-    shine = specular_albedo(gloss, view.cosine);
+    lobe_albedo = specular_albedo(gloss, view.cosine);
     vec3 whole = lit, of_body = specular_albedo(body, view.cosine);
     lit *= (1.0 - metal) * (1.0 - of_body);
     if (metal > 0.0 && metal < 1.0) {
         // a mixture has one lobe; what both lobes would reflect beyond it is scattered
         vec3 of_metal = specular_albedo(Gloss(clamp(whole, 0.0, 1.0), body.alpha), view.cosine);
-        lit += max(mix(of_body, of_metal, metal) - shine, 0.0);
+        lit += max(mix(of_body, of_metal, metal) - lobe_albedo, 0.0);
     }
     return gloss;
 }

@@ -1,6 +1,6 @@
 #version 460
-// Smooths specular light over the pixels that the lobe blurs anyway: about its width on the screen, by its roughness and
-// the distance of what it reflects, and more where the mean has few frames.
+// Smooths specular light over half the lobe's radius on the screen (`lobe_radius`) where the mean has four paths; over more
+// with fewer paths, over less with more.
 #include "trace/specular_filter.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -19,7 +19,7 @@ void main() {
     vec4 place = place_read(pixel);
     vec3 normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.images.surface], pixel).y);
     float tolerance = 0.1 + 6.0 * place.w * VIEW.camera.pixel_spread;
-    float radius = 0.5 * lobe_radius(own.roughness, own.away, place.w);
+    float radius = 0.5 * lobe_radius(own.roughness, own.hit_distance, place.w);
     radius = clamp(radius / sqrt(max(own.frames * 0.25, 0.25)), 0.0, MOST_RADIUS);
     vec3 sum = own.light;
     float total = 1.0;

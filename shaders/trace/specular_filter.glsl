@@ -19,12 +19,12 @@ struct SpecularTexel {
     vec3 light;
     float frames;    // 0: no rough surface
     float roughness; // perceptual
-    float away;      // distance from the surface to what it reflects
+    float hit_distance; // from the surface to what it reflects
 };
 
 void specular_texel_write(uint image, ivec2 pixel, SpecularTexel t, float dither) {
     uint codes = packUnorm4x8(vec4(t.frames / FRAME_CODES, t.roughness, 0.0, 0.0)) & 0xFFFFu;
-    imageStore(uimages_rg32ui[image], pixel, uvec4(pack_light(finite_light(t.light), dither), codes | packHalf2x16(vec2(0.0, t.away)), 0, 0));
+    imageStore(uimages_rg32ui[image], pixel, uvec4(pack_light(finite_light(t.light), dither), codes | packHalf2x16(vec2(0.0, t.hit_distance)), 0, 0));
 }
 
 SpecularTexel specular_texel_read(uint image, ivec2 pixel) {
@@ -45,9 +45,9 @@ float likeness(vec4 place, vec3 normal, float roughness, vec4 other, vec3 other_
 
 // Radius of a lobe on the screen, pixels: the tangent of its half width times the part of the way to the camera that
 // spreads it (Deferred Hybrid Path Tracing, section 26.5.3).
-float lobe_radius(float roughness, float away, float view_distance) {
+float lobe_radius(float roughness, float hit_distance, float view_distance) {
     float alpha = roughness * roughness;
-    return 0.5 * alpha * away / max((away + view_distance) * VIEW.camera.pixel_spread, 1.0e-6);
+    return 0.5 * alpha * hit_distance / max((hit_distance + view_distance) * VIEW.camera.pixel_spread, 1.0e-6);
 }
 
 // Unit vector along the ray of a pixel of the last frame.

@@ -40,7 +40,7 @@ float ray_share_of(uint light, vec3 position, vec3 direction, float ray) {
     }
     if (kind != LIGHT_TRIANGLE) return 0.0;
     TriangleLight triangle = triangle_light(light);
-    if ((triangle.flags & LIGHT_MET) == 0) return 0.0;
+    if ((triangle.flags & LIGHT_HITTABLE) == 0) return 0.0;
     vec3 a = triangle.corners[0] - position;
     vec3 face = cross(triangle.corners[1] - triangle.corners[0], triangle.corners[2] - triangle.corners[0]);
     float double_area = length(face), height = abs(dot(a, face)) / max(double_area, 1.0e-20);

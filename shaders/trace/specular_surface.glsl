@@ -10,19 +10,17 @@
 struct GlossPixel {
     Gloss gloss;
     // Specular albedo, with all that lies between camera and surface: the specular light S of the point, for a white
-    // environment 1, shows as shine * S.
-    vec3 shine;
+    // environment 1, shows as lobe_albedo * S.
+    vec3 lobe_albedo;
     vec3 to_viewer; // from the surface along the path to the camera
-    float away; // distance that the pixel's path has gone to what the surface reflects; 0: unknown
+    float hit_distance; // from the surface to what the pixel's path has hit; 0: unknown
 };
 
 const GlossPixel NO_GLOSS_PIXEL = GlossPixel(NO_GLOSS, vec3(0.0), vec3(0.0, 0.0, 1.0), 0.0);
 
-bool has_gloss() { return VIEW.images.specular != NO_IMAGE; }
-
 void gloss_write(ivec2 pixel, GlossPixel g) {
     uvec4 packed = uvec4(0);
-    if (is_glossy(g.gloss)) packed = uvec4(pack_light(g.gloss.reflectance, 0.5), pack_light(g.shine, 0.5), pack_normal(g.to_viewer), packHalf2x16(vec2(g.gloss.alpha, min(g.away, 60000.0))));
+    if (is_glossy(g.gloss)) packed = uvec4(pack_light(g.gloss.reflectance, 0.5), pack_light(g.lobe_albedo, 0.5), pack_normal(g.to_viewer), packHalf2x16(vec2(g.gloss.alpha, min(g.hit_distance, 60000.0))));
     imageStore(uimages_rgba32ui[VIEW.images.specular], pixel, packed);
 }
 
@@ -34,9 +32,9 @@ GlossPixel gloss_read(ivec2 pixel) {
 
 // What the specular light of the pixel adds to its radiance.
 vec3 shown_gloss(ivec2 pixel) {
-    if (!has_gloss()) return vec3(0.0);
-    vec3 shine = unpack_light(imageLoad(uimages_rgba32ui[VIEW.images.specular], pixel).y);
-    return shine == vec3(0.0) ? vec3(0.0) : shine * light_read(VIEW.images.specular_light, pixel);
+    if (HAS_GLOSS == 0) return vec3(0.0);
+    vec3 lobe_albedo = unpack_light(imageLoad(uimages_rgba32ui[VIEW.images.specular], pixel).y);
+    return lobe_albedo == vec3(0.0) ? vec3(0.0) : lobe_albedo * light_read(VIEW.images.specular_light, pixel);
 }
 
 #endif

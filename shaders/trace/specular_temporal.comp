@@ -51,9 +51,9 @@ void main() {
     float tolerance = 0.1 + 6.0 * place.w * VIEW.camera.pixel_spread;
     ivec2 cell = pixel / CELL, cells = (ivec2(VIEW.width, VIEW.height) + CELL - 1) / CELL;
     vec3 sum = vec3(0.0), mean = vec3(0.0), squares = vec3(0.0);
-    float total = 0.0, alike = 0.0, away = 0.0;
+    float total = 0.0, alike = 0.0, hit_distance = 0.0;
     // a lobe that is sharp on the screen takes the pixel's own path, which it has in one of four frames; a wide one all nine
-    float radius = lobe_radius(roughness, min(gloss_read(subsample_pixel(cell)).away, 4096.0), place.w);
+    float radius = lobe_radius(roughness, min(gloss_read(subsample_pixel(cell)).hit_distance, 4096.0), place.w);
     float reach = clamp(0.25 * radius * radius, 0.2, 8.0);
     for (int i = 0; i < 9; i++) {
         ivec2 at = cell + ivec2(i % 3 - 1, i / 3 - 1);
@@ -71,14 +71,14 @@ void main() {
         alike += weight;
         weight *= exp(-dot(off, off) / reach) + 1.0e-4;
         sum += light * weight;
-        away += min(other.away, 4096.0) * weight;
+        hit_distance += min(other.hit_distance, 4096.0) * weight;
         total += weight;
     }
     SpecularTexel texel = SpecularTexel(vec3(0.0), 1.0, roughness, 0.0);
     if (total > 0.0) {
         sum /= total;
         texel.light = sum;
-        texel.away = away / total;
+        texel.hit_distance = hit_distance / total;
     }
     if ((VIEW.flags & VIEW_HISTORY) != 0 && VIEW.images.last_specular != NO_IMAGE) {
         Motion motion = motion_read(pixel);
@@ -87,7 +87,7 @@ void main() {
         bool direct = distance(at, place.xyz) < 0.1 + 0.01 * place.w, moved = motion.last_view_distance < 0.0;
         vec4 plane = vec4(face, dot(face, place.xyz));
         if (direct && rests_in_last(motion, place.xyz)) {
-            float behind = texel.away * clamp(1.0 - roughness / ROUGH_MOTION, 0.0, 1.0);
+            float behind = texel.hit_distance * clamp(1.0 - roughness / ROUGH_MOTION, 0.0, 1.0);
             seen = last_seen(place_ahead(pixel, place.w + behind));
         } else if (!direct) {
             // seen in a mirror: the plane lies at its image
@@ -112,7 +112,7 @@ void main() {
             float fresh = min(total, 1.0);
             texel.frames = min(old.frames * kept + fresh, SPECULAR_FRAMES);
             texel.light = mix(mix(clamped, old.light, 0.5 * kept), sum, min(fresh / texel.frames, 1.0));
-        } else if (old.frames > 0.0) texel = SpecularTexel(old.light, old.frames, roughness, old.away);
+        } else if (old.frames > 0.0) texel = SpecularTexel(old.light, old.frames, roughness, old.hit_distance);
     }
     specular_texel_write(VIEW.images.fresh_specular, pixel, texel, dither(pixel, DITHER_SPECULAR));
 }

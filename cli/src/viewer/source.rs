@@ -208,8 +208,7 @@ fn find(
         let _ = sender.send(Progress::Part(part));
         wake();
     });
-    world.emit_by_hand(&*files);
-    world.light_by_hand(&*files);
+    world.read_by_hand(&*files);
     sweep(&mut world, Some(cache));
     Ok(())
 }

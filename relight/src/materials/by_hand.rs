@@ -14,7 +14,8 @@
 //! | `surface NAME IMAGE` | has a map of roughness (green) and metal (blue), which multiply those of other lines |
 //! | `plain NAME` | reflects nothing: forgets the lines before, and shows painted reflections as the game does |
 //!
-//! Of several lines that match a name and state the same, the last counts: lines of a map follow those of packs.
+//! Of several lines that match a name and state the same, the last counts: packs' files follow each other by name, and the
+//! map's file follows them.
 
 use glam::Vec3;
 
@@ -135,11 +136,6 @@ impl MaterialsByHand {
             }
         }
         (all, faults)
-    }
-
-    /// Whether no line states anything.
-    pub fn is_empty(&self) -> bool {
-        self.rules.is_empty()
     }
 
     /// What the lines state of a material.

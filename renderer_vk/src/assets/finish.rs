@@ -1,4 +1,5 @@
-//! How materials reflect, as files of materials and packs state it: on top of what their scripts decide.
+//! Applies files of materials (`relight::materials::by_hand`): they override what a material's script decides about its
+//! reflection.
 
 use glam::{Vec2, Vec3};
 use relight::materials::by_hand::{Finish, MaterialsByHand, USUAL_REFLECTANCE};
@@ -40,6 +41,12 @@ impl Materials {
         faults.dedup();
         self.touch();
         faults
+    }
+
+    /// Whether a material is rough or has a normal map.
+    pub fn has_gloss(&self) -> bool {
+        let gloss = c::MATERIAL_ROUGH | c::MATERIAL_NORMALS;
+        self.list.iter().any(|material| material.flags & gloss != 0)
     }
 
     /// Applies the files to a material. Returns what is wrong with its images.

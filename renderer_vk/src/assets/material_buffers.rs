@@ -117,7 +117,11 @@ impl Materials {
 
     /// Texture and sampler kind of a material whose stages reduce to one constant image under light: the image alone
     /// where light is computed or stored in vertices, or the product of image and baked light in either order.
+    /// None for glass of a file of materials, which does not show its stages.
     pub(super) fn plain_image(&self, material: &Material) -> Option<(u32, u32)> {
+        if material.flags & c::MATERIAL_CLEAR != 0 {
+            return None;
+        }
         let is_drawn = |s: &&types::Stage| s.flags & c::STAGE_LIGHT_STYLE == 0;
         let stages: Vec<_> = self.stages(material).iter().filter(is_drawn).collect();
         let plain = |s: &types::Stage| {

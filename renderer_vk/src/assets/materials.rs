@@ -571,12 +571,6 @@ impl Materials {
         self.generation += 1;
     }
 
-    /// Whether a material reflects by its roughness.
-    pub fn has_gloss(&self) -> bool {
-        let rough = types::constants::MATERIAL_ROUGH;
-        self.list.iter().any(|material| material.flags & rough != 0)
-    }
-
     /// A number that grows whenever a material is added or changed.
     pub fn generation(&self) -> u64 {
         self.generation

@@ -163,6 +163,11 @@ t/highsky
 }
 ";
 
+/// A picture of one texel that can be a normal map.
+const BLUE: &[u8] = &[
+    0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 24, 0, 255, 128, 128,
+];
+
 fn game() -> Registration {
     Registration::from_entries(&[
         ("scripts/t.shader", SCRIPT),
@@ -170,6 +175,7 @@ fn game() -> Registration {
         ("t/c.tga", PIXEL),
         ("t/b.jpg", PIXEL),
         ("t/plain.tga", PIXEL),
+        ("t/blue.tga", BLUE),
         ("t/box_rt.tga", PIXEL),
         ("t/box_up.tga", PIXEL),
     ])
@@ -585,6 +591,19 @@ fn files_of_materials_change_and_restore_materials() {
     let glass = game.materials.get(shiny);
     assert_eq!(glass.dielectric.index, 1.5);
     assert_ne!(glass.flags & c::MATERIAL_TRANSLUCENT, 0);
+    // a wall of one image becomes glass, too: rays must not take its image by the shortcut
+    let one_image = |game: &Registration| {
+        let wall = game.materials.get(wall);
+        game.materials.plain_image(wall).is_some()
+    };
+    assert!(one_image(&game));
+    set(&mut game, "glass t/wall 1.5 1 1 1");
+    assert!(!one_image(&game));
+    assert_ne!(game.materials.get(wall).flags & c::MATERIAL_CLEAR, 0);
+    set(&mut game, "normals t/wall t/blue");
+    assert_ne!(game.materials.get(wall).flags & c::MATERIAL_NORMALS, 0);
+    assert!(game.materials.has_gloss());
+    set(&mut game, "mirror t/wall 0.5 0.5 0.5");
     assert_eq!(flags(&game)[0], before[0] | c::MATERIAL_REFLECTS);
     // without lines everything is as before
     assert_eq!(set(&mut game, ""), [""; 0]);

@@ -136,7 +136,7 @@ impl Renderer {
         };
         let changed = world.light_by_hand(by_hand, assets);
         if let Some(trace) = &mut self.trace {
-            trace.change_lights(world)?;
+            trace.change_lights(world, assets)?;
         }
         Ok(changed)
     }
@@ -152,7 +152,7 @@ impl Renderer {
         };
         let read = world.read_by_hand_again(assets);
         if let Some(trace) = self.trace.as_mut().filter(|_| read) {
-            trace.change_lights(world)?;
+            trace.change_lights(world, assets)?;
         }
         Ok(read)
     }

@@ -82,7 +82,7 @@ pub struct MapNeeds {
     pub fog: bool,
     /// It has flat mirrors.
     pub mirrors: bool,
-    /// Materials reflect by their roughness.
+    /// Materials are rough or have normal maps.
     pub gloss: bool,
 }
 

@@ -23,7 +23,7 @@ pub struct FrameFacts {
     pub map_fog: bool,
     /// There is bounced light.
     pub bounces: bool,
-    /// Materials reflect by their roughness.
+    /// Materials are rough or have normal maps.
     pub gloss: bool,
 }
 

@@ -98,7 +98,7 @@ pub struct MaterialInfo {
 pub trait MaterialTable {
     /// The material drawn for `index` (after remapping), and its facts.
     fn info(&self, index: u32) -> (u32, MaterialInfo);
-    /// Whether materials reflect by their roughness.
+    /// Whether materials are rough or have normal maps.
     fn has_gloss(&self) -> bool {
         false
     }

@@ -64,8 +64,8 @@ pub struct MapLightSource<'a> {
     pub lists: &'a LightLists,
     /// Animation of each triangle light; missing entries are constant lights.
     pub flickers: &'a [Option<&'a Flicker>],
-    /// Of each triangle light, whether rays of bounced light meet it; missing entries are not met.
-    pub met: &'a [bool],
+    /// Whether rays of bounces can hit each triangle light; they cannot hit missing entries.
+    pub hittable: &'a [bool],
     /// Initial position of each brush model by the map's entities; triangle lights are at these positions.
     pub model_origins: &'a [Vec3],
     /// Radiance of the ambient light.
@@ -87,7 +87,7 @@ impl<'a> MapLightSource<'a> {
             suns: &[],
             lists,
             flickers: &[],
-            met: &[],
+            hittable: &[],
             model_origins: &[],
             ambient: Vec3::ZERO,
             light_cutoff: 0.0,
@@ -96,14 +96,14 @@ impl<'a> MapLightSource<'a> {
         }
     }
 
-    /// Whether rays meet a triangle light, with the radiance that the lists have: it neither moves nor changes.
-    fn is_met(&self, index: usize) -> bool {
+    /// Whether rays can hit a triangle light, with the radiance that the lists have: it neither moves nor changes.
+    fn is_hittable(&self, index: usize) -> bool {
         let changes = self.flickers.get(index).is_some_and(Option::is_some);
         let moves = self
             .triangles
             .get(index)
             .is_none_or(|light| light.model != 0);
-        !changes && !moves && self.met.get(index).copied().unwrap_or(false)
+        !changes && !moves && self.hittable.get(index).copied().unwrap_or(false)
     }
 
     /// Number of a point light; animated ones belong to each view.
@@ -221,7 +221,7 @@ fn emitted(source: &MapLightSource<'_>) -> Vec<t::EmittedLight> {
         if let Some(of_surface) = emitted.get_mut(surface) {
             *of_surface = t::EmittedLight {
                 radiance: light.radiance,
-                met: u32::from(source.is_met(index)),
+                hittable: u32::from(source.is_hittable(index)),
             };
         }
     }
@@ -272,7 +272,7 @@ impl SortedTriangles {
         for (index, (light, end)) in source.triangles.iter().zip(ends(source)).enumerate() {
             let known = source.flickers.get(index).copied().flatten();
             let flicker = known.map(|flicker| sorted.flicker(flicker));
-            let number = sorted.add(source, light, end, flicker, source.is_met(index));
+            let number = sorted.add(source, light, end, flicker, source.is_hittable(index));
             sorted.numbers.push(number);
         }
         sorted
@@ -294,7 +294,7 @@ impl SortedTriangles {
         light: &TriangleLight,
         end: f32,
         flicker: Option<usize>,
-        met: bool,
+        hittable: bool,
     ) -> Option<u32> {
         let origin = match light.model {
             0 => Vec3::ZERO,
@@ -305,8 +305,8 @@ impl SortedTriangles {
             light: triangle_light(light, end, origin),
             flicker,
         };
-        if met {
-            placed.light.flags |= c::LIGHT_MET;
+        if hittable {
+            placed.light.flags |= c::LIGHT_HITTABLE;
         }
         if light.model != 0 {
             match self.moving.iter_mut().find(|(m, _)| *m == light.model) {

@@ -14,16 +14,14 @@ use super::ahead::MapNeeds;
 use super::cutout::{Coverage, coverage};
 use super::fog_light;
 use super::geometry::StaticGeometry;
-use super::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface};
+use super::input::{Kind, MaterialInfo, MaterialTable, StaticScene, StaticSurface};
 use super::lights::{MapLightSource, MapLights};
 use super::pass_set::PassSet;
 use super::passes::counter_of;
 use super::surroundings::Surroundings;
 use super::tracer::Tracer;
 use super::view_tracer::{TracedMap, TracedView, ViewTracer};
-use relight::RelitWorld;
 use relight::light::{Occlusion, Sight, TriangleLight};
-use relight::materials::light::SurfaceClass;
 
 use crate::assets::compile::sampler;
 use crate::assets::{Assets, Materials};
@@ -77,7 +75,8 @@ impl MaterialTable for Assets {
     }
 }
 
-/// A number that changes when a material is remapped, its part for rays changes, or the height of a sky's clouds.
+/// A number that changes when a material is remapped, when files of materials change its `MATERIAL_*` bits, or when the
+/// height of a sky's clouds changes.
 fn remapping(materials: &Materials) -> u64 {
     let mut hasher = DefaultHasher::new();
     materials.cloud_height().to_bits().hash(&mut hasher);
@@ -135,35 +134,35 @@ fn geometry(
     Ok(geometry)
 }
 
-/// Whether rays of bounced light meet a triangle light where it is.
-fn is_met(relit: &RelitWorld, light: &TriangleLight) -> bool {
-    let surface = relit.surfaces.get(light.surface as usize);
-    let Some(material) = surface.and_then(|s| relit.material_of(s)) else {
+/// Whether rays of bounces can hit a triangle light where it is.
+fn is_hittable(world: &World, assets: &Assets, light: &TriangleLight) -> bool {
+    let surface = world.data.surfaces.get(light.surface as usize);
+    let Some(surface) = surface.filter(|surface| !surface.deformed) else {
         return false;
     };
-    let found = &material.class;
+    let (_, info) = assets.info(surface.material);
     let stops = matches!(
-        found.class,
-        SurfaceClass::Opaque | SurfaceClass::CutOut | SurfaceClass::Sky
+        Kind::in_light(info.flags, true),
+        Some(Kind::Opaque | Kind::Tested | Kind::Sky)
     );
-    light.triangle != u32::MAX
-        && stops
-        && !found.passed
-        && material.resolved.shader.deforms.is_empty()
+    light.triangle != u32::MAX && stops
 }
 
 /// Calls `with` with the lights of a map.
 fn with_lights<T>(
     world: &World,
+    assets: &Assets,
     with: impl FnOnce(&MapLightSource<'_>) -> Result<T, Error>,
 ) -> Result<T, Error> {
     let relit = &world.data.relit;
     let model_origins: Vec<_> = relit.models.iter().map(|m| m.origin).collect();
     let flickers: Vec<_> = relit.lights.iter().map(|l| relit.flicker_of(l)).collect();
     let occlusion = Occlusion::new(relit);
-    let met: Vec<bool> = relit.lights.iter().map(|l| is_met(relit, l)).collect();
+    let hittable: Vec<bool> = (relit.lights.iter())
+        .map(|light| is_hittable(world, assets, light))
+        .collect();
     let source = MapLightSource {
-        met: &met,
+        hittable: &hittable,
         triangles: &relit.lights,
         points: &relit.point_lights,
         suns: &relit.suns,
@@ -221,7 +220,7 @@ impl TraceLook {
         let mut view_tracer = ViewTracer::new(passes)?;
         let exposure = world.data.relit.display_exposure();
         view_tracer.map_exposure = exposure;
-        let (fogs, mut lights) = with_lights(world, |source| {
+        let (fogs, mut lights) = with_lights(world, assets, |source| {
             let fogs = fog_light::lit(&world.data.fogs, source);
             Ok((fogs, MapLights::new(device, source)?))
         })?;
@@ -243,9 +242,9 @@ impl TraceLook {
     ///
     /// # Errors
     /// The device is out of memory or lost.
-    pub fn change_lights(&mut self, world: &World) -> Result<(), Error> {
+    pub fn change_lights(&mut self, world: &World, assets: &Assets) -> Result<(), Error> {
         let device = self.passes.device();
-        let mut lights = with_lights(world, |source| MapLights::new(device, source))?;
+        let mut lights = with_lights(world, assets, |source| MapLights::new(device, source))?;
         lights.white = self.lights.white;
         lights.find_fogs(&self.geometry.fog_boxes);
         self.lights = lights;

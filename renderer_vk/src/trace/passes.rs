@@ -51,7 +51,7 @@ pub enum Switch {
     MapFog,
     /// There is bounced light.
     Bounces,
-    /// Materials reflect by their roughness.
+    /// Materials are rough or have normal maps.
     Gloss,
 }
 
@@ -286,6 +286,7 @@ passes! {
     }
     /// Light that flat mirrors of the map reflect onto the surfaces from which a bounce starts.
     MirrorLight = "trace_mirror_light", Rays(&shaders::TRACE_MIRROR_LIGHT), Cells {
+        switches: &[(ids::specular::HAS_GLOSS, Gloss)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals],
         may_read: &[GradientPixels, BounceLights],
         writes: &[BounceLights],
@@ -293,6 +294,7 @@ passes! {
     }
     /// Rays of a bounce.
     BounceRays = "trace_bounce_rays", Rays(&shaders::TRACE_BOUNCE_RAYS), Cells {
+        switches: &[(ids::specular::HAS_GLOSS, Gloss)],
         reads: &[Scene, GBuffer, Positions, Normals],
         may_read: &[GradientPixels, BounceLights, GlossSurfaces],
         writes: &[BounceHits],
@@ -302,26 +304,28 @@ passes! {
     BounceShade = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
         switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
-        may_read: &[GradientPixels, BounceLights],
-        writes: &[BounceLights],
+        may_read: &[GradientPixels, BounceLights, GlossSurfaces],
+        writes: &[BounceLights, GlossSurfaces],
     }
     /// The same of the last bounce, after which no path goes on.
     BounceShadeLast = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
         constants: &[(ids::bounce::LAST_BOUNCE, 1)],
         switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
-        may_read: &[GradientPixels, BounceLights],
-        writes: &[BounceLights],
+        may_read: &[GradientPixels, BounceLights, GlossSurfaces],
+        writes: &[BounceLights, GlossSurfaces],
     }
     /// Shadow rays to those lights; the last writes the light of the paths, of one of both kinds.
     BounceLight = "trace_bounce_light", Rays(&shaders::TRACE_BOUNCE_LIGHT), Cells {
+        switches: &[(ids::specular::HAS_GLOSS, Gloss)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceLights],
-        may_read: &[GradientPixels],
+        may_read: &[GradientPixels, GlossSurfaces],
         writes: &[IndirectLight, GlossLight],
         counter: Some(t::COUNT_BOUNCE_LIGHT),
     }
     /// Specular light of sampled lights at rough surfaces. The passes of a bounce then trace its other paths.
     SpecularLight = "trace_specular_light", Rays(&shaders::TRACE_SPECULAR_LIGHT), Cells {
+        constants: &[(ids::specular::HAS_GLOSS, 1)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, GlossSurfaces],
         writes: &[BounceLights],
         counter: Some(t::COUNT_SPECULAR),
@@ -408,6 +412,7 @@ passes! {
     }
     /// The linear picture; in reference mode the mean over frames.
     Composite = "trace_composite", Compute(&shaders::TRACE_COMPOSITE_COMP), Traced {
+        switches: &[(ids::specular::HAS_GLOSS, Gloss)],
         reads: &[GBuffer, Shown, DirectLight],
         may_read: &[IndirectLight, GlossSurfaces, GlossLight, Other, FogWeights, FogLight, FilteredFogLight, Gradients],
         writes: &[Picture],

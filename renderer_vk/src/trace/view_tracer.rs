@@ -503,7 +503,7 @@ fn fog_in_sight(map: &TracedMap<'_>, view: &TracedScene) -> bool {
     boxes.any(|(i, fog)| !view.look.portals.is_empty() || (may_see(i) && !outside(fog, &frustum)))
 }
 
-/// Whether rough surfaces reflect light.
+/// Whether rough surfaces and normal maps are in use.
 fn has_gloss(materials: &dyn MaterialTable, settings: &Settings) -> bool {
     settings.rt_specular && is_lit(settings) && materials.has_gloss()
 }

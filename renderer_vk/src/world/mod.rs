@@ -203,16 +203,24 @@ pub struct World {
     pub fog_buffer: Buffer,
     /// Light of the map for the traced look; `None` before the first traced view.
     lit: Option<Lit>,
-    /// The current light before hand-written lights changed it.
-    before_hand: Option<relight::world::Lighting>,
-    /// Lights before files of materials changed them, likewise.
-    before_files: Option<relight::world::Lighting>,
+    /// The current light before files changed it; `None` before the first traced view.
+    before: Option<Before>,
+}
+
+/// Stages of a map's light before hand-written files are applied.
+struct Before {
+    /// No file is applied.
+    files: relight::world::Lighting,
+    /// Files of materials are applied, and no file of lights.
+    lights: relight::world::Lighting,
 }
 
 /// The current light of a map, and the alternative one.
 struct Lit {
     choice: MapLightChoice,
     other: relight::world::Lighting,
+    /// `World::before` of the alternative light.
+    other_before: Option<Before>,
     /// The alternative light is computed; otherwise it is the map's initial light.
     found: bool,
 }
@@ -290,8 +298,7 @@ impl World {
             fog_buffer: Buffer::with_data(device, "fogs", BufferUsage::STORAGE, &data.fogs)?,
             data,
             lit: None,
-            before_hand: None,
-            before_files: None,
+            before: None,
         })
     }
 
@@ -307,6 +314,7 @@ impl World {
             return false;
         }
         let other = self.data.relit.lighting();
+        let other_before = self.before.take();
         let found = match self.lit.take() {
             None => {
                 self.find_light(choice, assets, cache);
@@ -315,6 +323,7 @@ impl World {
             Some(lit) => {
                 self.data.relit.set_lighting(lit.other);
                 if lit.found {
+                    self.before = lit.other_before;
                     self.mark_emitters(assets);
                 } else {
                     self.find_light(choice, assets, cache);
@@ -325,6 +334,7 @@ impl World {
         self.lit = Some(Lit {
             choice,
             other,
+            other_before,
             found,
         });
         true
@@ -375,9 +385,12 @@ impl World {
         let files = std::sync::Arc::clone(assets.textures.files());
         let relit = &mut self.data.relit;
         let warned = relit.warnings.len();
-        self.before_files = Some(relit.lighting());
+        let before_files = relit.lighting();
         let by_hand = relit.emit_by_hand(&*files);
-        self.before_hand = Some(relit.lighting());
+        self.before = Some(Before {
+            files: before_files,
+            lights: relit.lighting(),
+        });
         if relit.light_by_hand(&*files) {
             log::info!("{}: lights as in {}", relit.name, relit.lights_file());
         }
@@ -409,10 +422,10 @@ impl World {
     /// Reads the files of lights and materials beside the map again. False before the first traced view, which reads
     /// them.
     pub(crate) fn read_by_hand_again(&mut self, assets: &mut Assets) -> bool {
-        let Some(before) = self.before_files.clone() else {
+        let Some(before) = self.before.take() else {
             return false;
         };
-        self.data.relit.set_lighting(before);
+        self.data.relit.set_lighting(before.files);
         self.read_by_hand(assets, None);
         true
     }
@@ -420,7 +433,9 @@ impl World {
     /// The lights before hand-written ones changed them; `None` before the first traced view.
     pub fn lights_before_hand(&mut self) -> Option<relight::light::ChangeableLights> {
         let now = self.data.relit.lighting();
-        self.data.relit.set_lighting(self.before_hand.clone()?);
+        self.data
+            .relit
+            .set_lighting(self.before.as_ref()?.lights.clone());
         let lights = relight::light::ChangeableLights::of(&self.data.relit);
         self.data.relit.set_lighting(now);
         Some(lights)
@@ -434,11 +449,11 @@ impl World {
         assets: &mut Assets,
     ) -> LightsChanged {
         let begin = std::time::Instant::now();
-        let Some(before) = &self.before_hand else {
+        let Some(before) = &self.before else {
             return LightsChanged::default();
         };
         let relit = &mut self.data.relit;
-        relit.set_lighting(before.clone());
+        relit.set_lighting(before.lights.clone());
         let unknown = by_hand.apply(relit);
         relight::light::sweep(relit, None);
         self.mark_emitters(assets);

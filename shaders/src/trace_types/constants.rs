@@ -56,8 +56,8 @@ pub const MASK_NO_SHADOW: u8 = 0x80;
 
 /// Bits of `TriangleLight::flags`.
 pub const LIGHT_TWO_SIDED: u32 = 1;
-/// It is a triangle of the map that rays meet, and its radiance is constant.
-pub const LIGHT_MET: u32 = 2;
+/// A triangle of the map that rays of bounces can hit, with constant radiance.
+pub const LIGHT_HITTABLE: u32 = 2;
 
 /// Bits of `TraceView::flags`.
 pub const VIEW_JITTER: u32 = 1;

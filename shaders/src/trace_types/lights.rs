@@ -65,8 +65,8 @@ pub struct SunLight {
 pub struct EmittedLight {
     /// Radiance; zero for surfaces in no list.
     pub radiance: Vec3,
-    /// 1: its triangles have `LIGHT_MET`.
-    pub met: u32,
+    /// 1: its triangles have `LIGHT_HITTABLE`.
+    pub hittable: u32,
 }
 
 /// Bounds of a light for light sampling: a bounding sphere, and the emitted light.

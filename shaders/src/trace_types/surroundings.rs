@@ -88,7 +88,7 @@ pub struct TransportView {
     pub mirror_clusters: u32,
     /// 1: glass and liquids mirror the rays of bounces.
     pub mirroring_layers: u32,
-    /// Most surfaces that the light of a rough surface has met before.
+    /// Most bounces of a path that starts by the specular lobe of the visible surface, its first ray included.
     pub specular_bounces: u32,
     /// `SPECULAR_*`.
     pub specular_estimator: u32,

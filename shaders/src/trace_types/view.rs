@@ -80,7 +80,7 @@ pub struct ImageView {
     pub direct: u32,
     /// R32UI: bounced light.
     pub indirect: u32,
-    /// RGBA32UI: specular reflection of the surface (`specular_surface.glsl`); `NO_IMAGE` without rough surfaces.
+    /// RGBA32UI: specular reflection of the surface (`specular_surface.glsl`); only where materials are rough.
     pub specular: u32,
     /// R32UI: its light, before the reflectance.
     pub specular_light: u32,

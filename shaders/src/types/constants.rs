@@ -114,13 +114,8 @@ pub const MATERIAL_ROUGH: u32 = 32768;
 pub const MATERIAL_NORMALS: u32 = 65536;
 /// Its stages show painted reflections as the engine does, and no ray follows them.
 pub const MATERIAL_PLAIN: u32 = 131072;
-/// It shows none of its stages, but what it transmits by its filter colour.
+/// Clear glass that a file of materials states: transmits its filter colour and shows none of its stages.
 pub const MATERIAL_CLEAR: u32 = 262144;
-
-/// Channels of a material's specular map: roughness and metal in green and blue, as in glTF.
-pub const SPECULAR_MAP_ROUGH_METAL: u32 = 0;
-/// Reflectance in red, green and blue, as displayed; one minus the roughness in alpha.
-pub const SPECULAR_MAP_REFLECTANCE: u32 = 1;
 
 /// Drawn in front of everything near (first-person weapon).
 pub const INSTANCE_DEPTH_HACK: u32 = 1;

@@ -392,12 +392,13 @@ fn lights_of_the_map_can_be_chosen_while_playing() {
 }
 
 #[test]
-fn a_file_of_lights_is_named_when_it_is_used_and_when_it_is_not() {
+fn files_by_hand_are_named_when_they_are_used_and_when_they_are_not() {
     for pure in [false, true] {
         let mut engine = engine();
         let maps = engine.home().join("maps");
         std::fs::create_dir_all(&maps).unwrap();
         std::fs::write(maps.join("rooms.lights"), "ambient 40 1 1 1\n").unwrap();
+        std::fs::write(maps.join("rooms.materials"), "rough * 2\n").unwrap();
         if pure {
             engine.read_packs_only();
         }
@@ -409,8 +410,59 @@ fn a_file_of_lights_is_named_when_it_is_used_and_when_it_is_not() {
         let used = printed.contains("lights as in maps/rooms.lights");
         let ignored = printed.contains("maps/rooms.lights is not used: this server");
         assert_eq!((used, ignored), (!pure, pure), "{printed}");
+        let used = printed.contains("maps/rooms.materials: line 1: roughness is");
+        let ignored = printed.contains("maps/rooms.materials is not used: this server");
+        assert_eq!((used, ignored), (!pure, pure), "{printed}");
         engine.assert_clean();
     }
+}
+
+#[test]
+fn files_of_materials_change_the_traced_look_while_playing() {
+    let mut engine = engine();
+    let maps = engine.home().join("maps");
+    std::fs::create_dir_all(&maps).unwrap();
+    let file = maps.join("rooms.materials");
+    engine.set("rt_accumulate", "1");
+    engine.set("rt_lights", "prior");
+    engine.start_map(ROOMS).unwrap();
+    let view = View::new(HERE, 30.0);
+    let look = |engine: &mut Engine, traced: bool| {
+        engine.set("r_rt", if traced { "1" } else { "0" });
+        let frames = if traced { 24 } else { 1 };
+        (0..frames).fold(None, |_, _| Some(engine.picture(&view).unwrap()))
+    };
+    let classic = look(&mut engine, false).unwrap();
+    let plain = look(&mut engine, true).unwrap();
+    let alike = |a: &Rgb8, b: &Rgb8| relight::compare::compare(a, b).unwrap().ssim;
+    for (name, text) in [
+        ("glass", "glass textures/test/wall 1.5 1 0.6 0.6"),
+        ("mirror", "mirror textures/test/* 0.8 0.8 0.8"),
+        ("metal", "metal textures/test/*\nrough textures/test/* 0.3"),
+        ("emit", "emit textures/test/wall 300 1 0.2 0.2"),
+    ] {
+        std::fs::write(&file, text).unwrap();
+        engine.command("rt_reload").unwrap();
+        let changed = look(&mut engine, true).unwrap();
+        dump(&changed, &format!("materials-{name}"));
+        let ssim = alike(&plain, &changed);
+        println!("{name}: {ssim}, {}", changed.mean_luminance());
+        assert!(ssim < 0.9, "{name}: {ssim}");
+        assert_eq!(look(&mut engine, false).unwrap(), classic, "{name}");
+        // a choice of lights keeps the files, and their own lights
+        engine.set("rt_lights", "calibrated");
+        look(&mut engine, true);
+        engine.set("rt_lights", "prior");
+        engine.command("rt_reload").unwrap();
+        let again = look(&mut engine, true).unwrap();
+        let ssim = alike(&changed, &again);
+        assert!(ssim > 0.9, "{name}: {ssim}");
+    }
+    std::fs::write(&file, "").unwrap();
+    engine.command("rt_reload").unwrap();
+    let back = look(&mut engine, true).unwrap();
+    assert!(alike(&plain, &back) > 0.99, "{}", alike(&plain, &back));
+    engine.assert_clean();
 }
 
 #[test]

@@ -236,6 +236,12 @@ impl RelitWorld {
         by_hand
     }
 
+    /// Applies files of materials, then the file of lights beside the map.
+    pub fn read_by_hand(&mut self, files: &dyn GameFiles) {
+        self.emit_by_hand(files);
+        self.light_by_hand(files);
+    }
+
     /// Applies the [file](LightsByHand) beside the map; whether there is one. Its errors become warnings of the world.
     pub fn light_by_hand(&mut self, files: &dyn GameFiles) -> bool {
         let path = self.lights_file();
@@ -391,17 +397,19 @@ spot 1 2 3 100 1 1 1 1 2 3 30
         assert!((near - expected).length() < 0.1, "{near}");
     }
 
+    /// The sample map, not calibrated.
+    fn load(files: &crate::files::MemoryFiles) -> RelitWorld {
+        let (materials, _) = Materials::load(files);
+        let options = Options {
+            calibrate: None,
+            ..Options::default()
+        };
+        RelitWorld::load(files, &materials, sample::MAP, options).unwrap()
+    }
+
     #[test]
     fn a_file_beside_the_map_changes_its_lights() {
         let mut files = sample::files().unwrap();
-        let load = |files: &crate::files::MemoryFiles| {
-            let (materials, _) = Materials::load(files);
-            let options = Options {
-                calibrate: None,
-                ..Options::default()
-            };
-            RelitWorld::load(files, &materials, sample::MAP, options).unwrap()
-        };
         let plain = load(&files);
         assert!(plain.lights.len() > 1 && plain.warnings.is_empty());
         let lamp = plain.surfaces[plain.lights[0].surface as usize].material;
@@ -431,14 +439,6 @@ spot 1 2 3 100 1 1 1 1 2 3 30
     #[test]
     fn files_of_materials_state_light_that_files_of_lights_override() {
         let mut files = sample::files().unwrap();
-        let load = |files: &crate::files::MemoryFiles| {
-            let (materials, _) = Materials::load(files);
-            let options = Options {
-                calibrate: None,
-                ..Options::default()
-            };
-            RelitWorld::load(files, &materials, sample::MAP, options).unwrap()
-        };
         let plain = load(&files);
         let lamp = plain.surfaces[plain.lights[0].surface as usize].material;
         let name = plain.materials[lamp as usize].name.clone();

@@ -1,12 +1,16 @@
 //! Rough surfaces: white furnaces, agreement of estimators, limits of smooth and rough.
 
-use glam::Vec3;
+use std::f32::consts::PI;
+
+use glam::{Vec2, Vec3};
 use shaders::trace_types::{SkyRecord, constants as t};
-use shaders::types::{Specular, constants as c};
+use shaders::types::{Dielectric, Specular, Stage, constants as c};
 
 use super::bounces::{by_each_way, furnace, seen};
+use super::dielectrics::square;
 use super::harness::{
-    Gpu, Scene, bounced, encode, floor_at, gpu_tests, rectangle, reference, stage, through_byte,
+    Gpu, Scene, bounced, encode, floor_at, gpu_tests, identity, rectangle, reference, stage,
+    through_byte,
 };
 use crate::settings::{DenoiserChoice, Settings};
 
@@ -19,6 +23,10 @@ gpu_tests! {
         rough_surfaces_light_others,
         live_frames_have_the_same_mean,
         live_light_comes_to_rest,
+        normal_maps_turn_the_surface,
+        marks_leave_the_gloss_of_their_surface,
+        maps_of_roughness_and_metal_are_factors,
+        a_pane_shows_the_gloss_behind_it,
     ],
 }
 
@@ -90,7 +98,7 @@ fn floor_below_a_lamp(roughness: f32) -> Scene {
     for light in &mut scene.lights {
         light.surface = 1;
     }
-    scene.lights_are_met = true;
+    scene.lights_are_hittable = true;
     scene
 }
 
@@ -189,7 +197,7 @@ fn rough_surfaces_light_others(gpu: &mut Gpu) {
         let mut scene = furnace(1.0, 1.0);
         shine(&mut scene, 0, roughness, 1.0, 0.0);
         for bounces in [0, 1, 3] {
-            // what a rough surface reflects has the bounces of what a mirror shows
+            // the surface that the lobe's ray hits has `bounces` bounces of its own, as behind a mirror
             let exact = seen(e, 1.0, e * (bounces + 1) as f32);
             let mean = gpu.mean(&scene, &bounced(bounces), 32).x;
             println!("roughness {roughness}, {bounces} bounces: {mean} {exact}");
@@ -226,4 +234,75 @@ fn live_light_comes_to_rest(gpu: &mut Gpu) {
         println!("{roughness}: {} {}", errors[0], errors[31]);
         assert!(errors[31] < 0.7 * errors[0], "{errors:?}");
     }
+}
+
+fn normal_maps_turn_the_surface(gpu: &mut Gpu) {
+    // without roughness: a material may have normals alone
+    for (red, green, direction) in [(204, 128, Vec3::X), (128, 204, Vec3::NEG_Y)] {
+        let texels: Vec<u8> = [red, green, 230, 255].repeat(4);
+        let image = square(gpu, 2, &texels);
+        for side in [1.0, -1.0] {
+            let mut scene = Scene::new(Vec3::new(0.0, 0.0, 60.0), Vec3::ZERO, 30.0, 8);
+            let white = scene.diffuse(1.0);
+            let material = &mut scene.materials[white as usize];
+            material.0.flags |= c::MATERIAL_NORMALS;
+            material.1.flags |= c::MATERIAL_NORMALS;
+            material.0.specular.normals = image.texture_index();
+            material.0.specular.normal_scale = Vec2::ONE;
+            scene.quad(floor_at(0.0, 500.0), white);
+            let sun = direction * (0.6 * side) + Vec3::Z * 0.8;
+            scene.sun(sun, 3.0, 0.001);
+            let mean = gpu.mean(&scene, &reference(), 4).x;
+            // the normal is 0.6 along the axis and 0.8 up
+            let exact = 3.0 / PI * (0.36 * side + 0.64);
+            println!("{red} {green} {side}: {mean} {exact}");
+            assert!((mean / exact - 1.0).abs() < 0.02, "{red} {green} {side}");
+        }
+    }
+}
+
+fn marks_leave_the_gloss_of_their_surface(gpu: &mut Gpu) {
+    let mut scene = floor_below_a_lamp(0.3);
+    let plain = gpu.mean(&scene, &reference(), 256).x;
+    let faint = Stage {
+        flags: c::STAGE_MATTER | c::STAGE_WHITE,
+        ..stage::blend([0.5; 3], 4.0 / 255.0)
+    };
+    let flags = c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED | c::MATERIAL_POLYGON_OFFSET;
+    let mark = scene.material(&[faint], flags);
+    scene.mesh(floor_at(0.1, 400.0), mark, identity());
+    let marked = gpu.mean(&scene, &reference(), 256).x;
+    println!("{plain} {marked}");
+    assert!((marked / plain - 1.0).abs() < 0.05, "{plain} {marked}");
+}
+
+fn a_pane_shows_the_gloss_behind_it(gpu: &mut Gpu) {
+    // a pane splits pixels into those that show its reflection and those that show what is behind it
+    for metal in [0.5, 1.0] {
+        let mut scene = floor_below_a_lamp(0.4);
+        scene.materials[0].0.specular.metal = metal;
+        let flags = c::MATERIAL_GLASS | c::MATERIAL_TRANSLUCENT;
+        let pane = scene.material(&[stage::filter([1.0; 3])], flags);
+        scene.materials[pane as usize].0.dielectric = Dielectric {
+            index: 1.5,
+            scale: 1.0,
+            ..Dielectric::default()
+        };
+        scene.quad(floor_at(20.0, 400.0), pane);
+        let [exact, live] = by_each_way(gpu, &scene, &bounced(1), 64).map(|mean| mean.x);
+        println!("{metal}: {exact} {live}");
+        // a diffuse floor behind the pane is 4.5 % darker live
+        assert!((live / exact - 1.0).abs() < 0.08, "{metal}: {exact} {live}");
+    }
+}
+
+fn maps_of_roughness_and_metal_are_factors(gpu: &mut Gpu) {
+    let image = square(gpu, 2, &[255, 128, 51, 255].repeat(4));
+    let mut mapped = floor_below_a_lamp(0.8);
+    mapped.materials[0].0.specular.map = image.texture_index();
+    let mut stated = floor_below_a_lamp(0.8 * 128.0 / 255.0);
+    stated.materials[0].0.specular.metal *= 0.2;
+    let [mapped, stated] = [mapped, stated].map(|scene| gpu.mean(&scene, &reference(), 256).x);
+    println!("{mapped} {stated}");
+    assert!((mapped / stated - 1.0).abs() < 0.005, "{mapped} {stated}");
 }

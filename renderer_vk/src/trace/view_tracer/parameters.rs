@@ -276,8 +276,8 @@ fn camera_view(traced: &TracedView<'_>, height: u32) -> CameraView {
     }
 }
 
-/// Most surfaces that the light of a rough surface has met before. In the mean of many frames a rough surface and a mirror
-/// show the same bounces: those of what they reflect.
+/// Bounces of a path that starts by a specular lobe. In reference mode one more than `rt_bounces`, as for a path behind a
+/// mirror: the surface that the first ray hits has all bounces of a visible one.
 fn specular_bounces(settings: &Settings) -> u32 {
     let bounces = settings.rt_bounces.min(MOST_BOUNCES);
     match settings.rt_accumulate {

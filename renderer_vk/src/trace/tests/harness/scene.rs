@@ -30,8 +30,8 @@ pub struct Scene {
     pub indices: Vec<u32>,
     pub surfaces: Vec<StaticSurface>,
     pub lights: Vec<TriangleLight>,
-    /// Every triangle light is an opaque surface of the map.
-    pub lights_are_met: bool,
+    /// Rays can hit every triangle light: an opaque surface of the map.
+    pub lights_are_hittable: bool,
     pub points: Vec<PointLight>,
     pub suns: Vec<SunLight>,
     pub ambient: Vec3,
@@ -70,7 +70,7 @@ impl Scene {
             indices: Vec::new(),
             surfaces: Vec::new(),
             lights: Vec::new(),
-            lights_are_met: false,
+            lights_are_hittable: false,
             points: Vec::new(),
             suns: Vec::new(),
             ambient: Vec3::ZERO,
@@ -399,7 +399,7 @@ impl Scene {
             suns: &self.suns,
             lists: self.tree.as_ref().map_or(&lists, |t| &t.1),
             flickers: &[],
-            met: &vec![self.lights_are_met; self.lights.len()],
+            hittable: &vec![self.lights_are_hittable; self.lights.len()],
             model_origins: &[],
             ambient: self.ambient,
             light_cutoff: self.light_cutoff,
@@ -458,7 +458,8 @@ impl MaterialTable for Table {
     }
 
     fn has_gloss(&self) -> bool {
-        (self.infos.iter()).any(|info| info.flags & c::MATERIAL_ROUGH != 0)
+        let gloss = c::MATERIAL_ROUGH | c::MATERIAL_NORMALS;
+        (self.infos.iter()).any(|info| info.flags & gloss != 0)
     }
 
     fn generation(&self) -> u64 {
