@@ -1,5 +1,6 @@
 //! A material as a script defines it.
 
+use crate::reflection::Reflection;
 use crate::stage::{Stage, StageImage, Wave};
 use glam::Vec3;
 
@@ -65,6 +66,12 @@ pub struct Shader {
     pub deforms: Vec<Deform>,
     /// Stages in drawing order.
     pub stages: Vec<Stage>,
+    /// How it reflects, in the words of `opengl2`.
+    #[cfg_attr(
+        feature = "serde",
+        serde(default, skip_serializing_if = "Reflection::is_empty")
+    )]
+    pub reflection: Reflection,
     /// Set when the material is a sky.
     pub sky: Option<Sky>,
     /// Fog that a brush of this material is filled with.
@@ -106,6 +113,7 @@ impl Shader {
             sort: None,
             deforms: Vec::new(),
             stages: Vec::new(),
+            reflection: Reflection::default(),
             sky: None,
             fog: None,
             polygon_offset: false,

@@ -3,12 +3,13 @@
 use super::{
     Reporter, Variables,
     condition::Chain,
+    stage::Read,
     values::{lookup, number_at},
 };
 use crate::{
     diagnostic::Severity,
     shader::{Cull, Deform, Fog, Location, Shader, Sky, Sun, UnknownDirective, sort},
-    stage::Stage,
+    stage::TcGen,
     surface_params::{CONTENTS_FOG, surface_param},
     token::{Lexer, Position, Token, number, words},
 };
@@ -41,6 +42,8 @@ pub(super) struct DefinitionParser<'text, 'reporter, 'file> {
     reports: usize,
     /// The file is a `.shaderx`, whose further keywords only Quake3e knows.
     pub(super) extended: bool,
+    /// Words of reflection mean what they mean with `r_pbr 1`.
+    pub(super) pbr: bool,
     pub(super) variables: Variables<'text>,
     pub(super) chain: Chain,
 }
@@ -103,6 +106,7 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
             depth: 0,
             reports: 0,
             extended,
+            pbr: number(&variables("r_pbr")) != 0.0,
             variables,
             chain: None,
         }
@@ -167,10 +171,10 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
                 }
                 stages_seen += 1;
                 self.depth = 2;
-                let stage: Option<Stage> = self.stage()?;
+                let stage = self.stage()?;
                 self.depth = 1;
                 match stage {
-                    Some(stage) if !list_ended => self.shader.stages.push(stage),
+                    Some(stage) if !list_ended => self.take(stage),
                     Some(_) => {}
                     None => {
                         self.at = token.position;
@@ -189,6 +193,38 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
             return Err(Rejection(NOTHING_TO_DRAW.to_owned()));
         }
         Ok(())
+    }
+
+    /// Adds a stage. Maps of the reflection belong to the first stage of colour, which must stand before them.
+    fn take(&mut self, stage: Read) {
+        let reflection = &mut self.shader.reflection;
+        let mut colors =
+            (self.shader.stages.iter()).filter(|stage| stage.tc_gen != TcGen::Lightmap);
+        let after_color = colors.next().is_some();
+        match stage {
+            Read::Color(stage, specular) => {
+                let first = !after_color && stage.tc_gen != TcGen::Lightmap;
+                if first && !specular.is_empty() {
+                    reflection.specular = Some(specular);
+                }
+                self.shader.stages.push(stage);
+            }
+            Read::Normals(normals) if after_color => {
+                reflection.normals.get_or_insert(normals);
+            }
+            Read::Specular(specular) if after_color => {
+                if reflection
+                    .specular
+                    .as_ref()
+                    .is_none_or(|s| s.image.is_none())
+                {
+                    reflection.specular = Some(specular);
+                }
+            }
+            Read::Normals(_) | Read::Specular(_) => {
+                self.warn("a map of normals or reflection before the image that it belongs to is not used");
+            }
+        }
     }
 
     fn keyword(&mut self, token: &Token) -> Result<(), Rejection> {

@@ -5,6 +5,7 @@ use super::{
     values::{destination_factor, lookup, source_factor},
 };
 use crate::{
+    reflection::{NormalStage, SpecularStage, smoothness_of_exponent},
     stage::{AlphaFunc, AlphaGen, BlendFactor, DepthFunc, RgbGen, Stage, StageImage, TcGen, TcMod},
     token::{Token, number},
 };
@@ -34,6 +35,25 @@ struct Draft {
     tc_mods: Vec<TcMod>,
     /// A change that could not be read ends the list.
     tc_mods_ended: bool,
+    kind: Kind,
+    normal_scale: Vec2,
+    specular: SpecularStage,
+}
+
+/// What a stage is for (`stage NAME`).
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Color,
+    Normals,
+    Specular,
+}
+
+/// A stage that is read.
+pub(super) enum Read {
+    /// It is drawn.
+    Color(Stage, SpecularStage),
+    Normals(NormalStage),
+    Specular(SpecularStage),
 }
 
 impl Draft {
@@ -44,7 +64,7 @@ impl Draft {
 
 impl DefinitionParser<'_, '_, '_> {
     /// Reads a stage whose opening brace is read; `None` when it names no image.
-    pub(super) fn stage(&mut self) -> Result<Option<Stage>, Rejection> {
+    pub(super) fn stage(&mut self) -> Result<Option<Read>, Rejection> {
         let line = self.at.line;
         let mut draft = Draft {
             image: None,
@@ -62,6 +82,9 @@ impl DefinitionParser<'_, '_, '_> {
             tc_gen: None,
             tc_mods: Vec::new(),
             tc_mods_ended: false,
+            kind: Kind::Color,
+            normal_scale: Vec2::ONE,
+            specular: SpecularStage::default(),
         };
         loop {
             let token = self
@@ -133,9 +156,100 @@ impl DefinitionParser<'_, '_, '_> {
             "dlight" if self.extended => draft.dynamic_light = true,
             // only the engine's own depth pass uses it
             "depthfragment" if self.extended => {}
+            "stage" => self.kind(draft),
+            "normalscale" => self.normal_scale(draft),
+            "specularscale" => self.specular_scale(draft),
+            word @ ("specularreflectance"
+            | "specularexponent"
+            | "gloss"
+            | "roughness"
+            | "parallaxdepth") => self.specular_word(word, draft),
             _ => return Err(Rejection(format!("unknown stage keyword '{}'", token.text))),
         }
         Ok(())
+    }
+
+    fn kind(&mut self, draft: &mut Draft) {
+        let Some(kind) = self.lexer.token_on_line() else {
+            self.warn("stage without a kind");
+            return;
+        };
+        draft.kind = match kind.text.to_ascii_lowercase().as_str() {
+            "diffusemap" => Kind::Color,
+            "normalmap" | "bumpmap" | "normalparallaxmap" | "bumpparallaxmap" => {
+                draft.normal_scale = Vec2::ONE;
+                Kind::Normals
+            }
+            "specularmap" => {
+                draft.specular = SpecularStage::default();
+                Kind::Specular
+            }
+            _ => {
+                self.warn(format!("unknown stage '{}'", kind.text));
+                return;
+            }
+        };
+    }
+
+    /// The numbers up to the end of the line.
+    fn numbers(&mut self) -> Vec<f32> {
+        std::iter::from_fn(|| self.lexer.token_on_line())
+            .map(|token| token.number())
+            .collect()
+    }
+
+    fn normal_scale(&mut self, draft: &mut Draft) {
+        // the third number scales heights
+        match self.numbers()[..] {
+            [] => self.warn("normalScale without a number"),
+            [both] => draft.normal_scale = Vec2::splat(both),
+            [x, y, ..] => draft.normal_scale = Vec2::new(x, y),
+        }
+    }
+
+    fn specular_scale(&mut self, draft: &mut Draft) {
+        let numbers = self.numbers();
+        let specular = &mut draft.specular;
+        match (numbers[..].as_ref(), self.pbr) {
+            ([] | [_], _) => self.warn("specularScale needs at least two numbers"),
+            (&[metal, smoothness], true) => {
+                specular.metal = Some(if metal < 0.5 { 0.0 } else { 1.0 });
+                specular.smoothness = Some(smoothness);
+            }
+            (&[smoothness, metal, ..], true) => {
+                specular.smoothness = Some(smoothness);
+                specular.metal = Some(metal);
+            }
+            (&[all, smoothness], false) => {
+                specular.reflectance = Some(Vec3::splat(all));
+                specular.smoothness = Some(smoothness);
+            }
+            (&[r, g, b, ref rest @ ..], false) => {
+                specular.reflectance = Some(Vec3::new(r, g, b));
+                specular.smoothness = rest.first().copied().or(specular.smoothness);
+            }
+        }
+    }
+
+    /// A word with one number.
+    fn specular_word(&mut self, word: &str, draft: &mut Draft) {
+        let Some(value) = self.lexer.token_on_line().map(|token| token.number()) else {
+            self.warn(format!("{word} without a number"));
+            return;
+        };
+        let specular = &mut draft.specular;
+        match word {
+            "specularreflectance" if self.pbr => {
+                specular.metal = Some(if value < 0.5 { 0.0 } else { 1.0 });
+            }
+            "specularreflectance" => specular.reflectance = Some(Vec3::splat(value)),
+            "specularexponent" => specular.smoothness = Some(smoothness_of_exponent(value)),
+            "gloss" if self.pbr => specular.smoothness = Some(1.0 - (-3.0 * value).exp2()),
+            "gloss" => specular.smoothness = Some(value),
+            "roughness" => specular.smoothness = Some(1.0 - value),
+            // parallaxDepth: heights are not used
+            _ => {}
+        }
     }
 
     fn required(&mut self, keyword: &str) -> Result<String, Rejection> {
@@ -373,14 +487,29 @@ impl DefinitionParser<'_, '_, '_> {
     }
 
     /// Fills in what the script leaves open.
-    fn finish(&self, draft: Draft, line: u32) -> Option<Stage> {
+    fn finish(&self, mut draft: Draft, line: u32) -> Option<Read> {
+        let image = draft.image?;
+        draft.specular.metallic = self.pbr;
+        match draft.kind {
+            Kind::Color => {}
+            Kind::Normals => {
+                return Some(Read::Normals(NormalStage {
+                    image: image.names().first()?.clone(),
+                    scale: draft.normal_scale,
+                }));
+            }
+            Kind::Specular => {
+                draft.specular.image = Some(image.names().first()?.clone());
+                return Some(Read::Specular(draft.specular));
+            }
+        }
         let rgb_gen = draft.rgb_gen.unwrap_or(match draft.blend {
             None | Some((BlendFactor::One | BlendFactor::SrcAlpha, _)) => RgbGen::IdentityLighting,
             Some(_) => RgbGen::Identity,
         });
         let overwrites = draft.blend == Some((BlendFactor::One, BlendFactor::Zero));
-        Some(Stage {
-            image: draft.image?,
+        let stage = Stage {
+            image,
             replaced: draft.replaced,
             blend: if overwrites { None } else { draft.blend },
             alpha_func: draft.alpha_func,
@@ -399,6 +528,7 @@ impl DefinitionParser<'_, '_, '_> {
             no_mipmaps: self.shader.no_mipmaps,
             no_picmip: self.shader.no_picmip,
             line,
-        })
+        };
+        Some(Read::Color(stage, draft.specular))
     }
 }
