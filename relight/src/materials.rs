@@ -2,18 +2,27 @@
 //! default for everything that is missing. [`light`]: what a material is to light.
 
 pub mod by_hand;
+pub mod finish;
 pub mod light;
+pub mod mat;
+mod of_pack;
 
 use crate::files::GameFiles;
 use crate::image;
 use shaderscript::{Diagnostic, ImplicitKind, Library, Shader};
 use std::collections::{HashMap, HashSet};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// The materials of a game.
 #[derive(Debug)]
 pub struct Materials {
     library: Library,
+    /// The scripts with `.mtr` files in place of those of the same names, if there are any.
+    with_mtr: Option<Library>,
+    /// Maps of reflection have the channels of `r_pbr 1`.
+    pbr: bool,
+    /// Names that are no maps of other images.
+    drawn: OnceLock<HashSet<String>>,
     /// Whether the image of a name exists, for names requested so far.
     images: Mutex<HashMap<String, bool>>,
     /// Materials whose fault was reported.
@@ -47,32 +56,51 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Materials {
-    /// Reads `scripts/*.shader` in the engine's order.
+    /// Reads `scripts/*.shader` in the engine's order, and `.mtr` files beside them.
     ///
     /// Faults of scripts, and scripts that cannot be read, are in the diagnostics; none of them is fatal.
     pub fn load(files: &dyn GameFiles) -> (Materials, Vec<Diagnostic>) {
-        let mut scripts = Vec::new();
         let mut unreadable = Vec::new();
-        for name in files.list("scripts", ".shader") {
-            let path = format!("scripts/{name}");
-            match files.read(&path) {
-                Ok(Some(text)) => scripts.push((path, text)),
-                Ok(None) => {}
-                Err(problem) => unreadable.push(Diagnostic {
+        let mut read = |path: String| match files.read(&path) {
+            Ok(Some(text)) => Some((path, text)),
+            Ok(None) => None,
+            Err(problem) => {
+                unreadable.push(Diagnostic {
                     file: path,
                     line: 1,
                     column: 1,
                     severity: shaderscript::Severity::Error,
                     shader: None,
                     message: format!("cannot be read: {problem}"),
-                }),
+                });
+                None
             }
-        }
+        };
+        let names = files.list("scripts", ".shader");
+        let path = |name: &String| read(format!("scripts/{name}"));
+        let scripts: Vec<_> = names.iter().filter_map(path).collect();
+        let mut replaced = false;
+        let mtr = |(shader, text): &(String, Vec<u8>)| {
+            let found = read(format!("{}.mtr", shaderscript::strip_extension(shader)));
+            let found = found.filter(|(_, text)| !text.is_empty());
+            replaced |= found.is_some();
+            found.unwrap_or_else(|| (shader.clone(), text.clone()))
+        };
+        let with_mtr: Vec<_> = if files.list("scripts", ".mtr").is_empty() {
+            Vec::new()
+        } else {
+            scripts.iter().map(mtr).collect()
+        };
         let variables = |name: &str| files.variable(name);
-        let library = Library::of_engine(scripts, &variables, files.precedence());
-        let mut materials = Materials::from_library(library);
+        let library = |scripts| Library::of_engine(scripts, &variables, files.precedence());
+        let mut materials = Materials::from_library(library(scripts));
+        materials.pbr = shaderscript::token::number(&files.variable("r_pbr")) != 0.0;
+        materials.with_mtr = replaced.then(|| library(with_mtr));
         materials.unusable.extend_from_slice(&unreadable);
         unreadable.extend_from_slice(materials.library.diagnostics());
+        let of_mtr = (materials.with_mtr.iter()).flat_map(|library| library.diagnostics());
+        let of_mtr = of_mtr.filter(|fault| fault.file.ends_with(".mtr"));
+        unreadable.extend(of_mtr.cloned());
         (materials, unreadable)
     }
 
@@ -81,6 +109,9 @@ impl Materials {
         Materials {
             unusable: library.dropped().to_vec(),
             library,
+            with_mtr: None,
+            pbr: false,
+            drawn: OnceLock::new(),
             images: Mutex::default(),
             reported: Mutex::default(),
         }
@@ -89,6 +120,11 @@ impl Materials {
     /// The scripts.
     pub fn library(&self) -> &Library {
         &self.library
+    }
+
+    /// The scripts whose words of reflection count.
+    pub fn reflections(&self) -> &Library {
+        self.with_mtr.as_ref().unwrap_or(&self.library)
     }
 
     /// The material of a name, for a kind of use.
@@ -129,7 +165,14 @@ impl Materials {
     /// What is wrong with whole script files: nothing of them is used, because they cannot be read or their braces do
     /// not match, or a comment takes the rest of them.
     pub fn faults_of_files(&self) -> impl Iterator<Item = &Diagnostic> {
-        (self.unusable.iter()).chain(self.library.warnings_of_files())
+        let of_mtr = self.with_mtr.iter().flat_map(Library::warnings_of_files);
+        let dropped = self.with_mtr.iter().flat_map(Library::dropped);
+        let of_mtr = of_mtr
+            .chain(dropped)
+            .filter(|fault| fault.file.ends_with(".mtr"));
+        (self.unusable.iter())
+            .chain(self.library.warnings_of_files())
+            .chain(of_mtr)
     }
 
     /// Why the engine would not draw a script's definition.

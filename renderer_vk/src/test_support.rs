@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::{Vec3, Vec4};
 use relight::image::{self, Image};
+use relight::materials::finish::SurfaceMap;
 use relight::{GameFiles, MemoryFiles, RelitWorld, SearchPath};
 use shaders::types::Vertex;
 
@@ -65,6 +66,18 @@ impl ImageSource for FakeTextures {
         self.flags.insert(name.into(), flags);
         self.by_name.insert(name.into(), found);
         found.map(|index| (index, flags))
+    }
+
+    fn surface_map(&mut self, map: &SurfaceMap) -> Option<u32> {
+        map.load(&*self.files).ok().flatten()?;
+        let next = self.next + 1;
+        let index = *self.by_name.entry(map.to_string()).or_insert(Some(next));
+        self.next = next;
+        index
+    }
+
+    fn exists(&self, name: &str) -> bool {
+        image::find(&*self.files, name).is_some()
     }
 
     fn white(&self) -> u32 {

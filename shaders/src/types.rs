@@ -126,14 +126,15 @@ pub struct Specular {
     /// Part of the surface that is metal, 0 to 1: its colour is that of the reflection, and it scatters nothing.
     pub metal: f32,
     /// Reflectance at normal incidence of the part that is no metal.
-    pub reflectance: f32,
-    /// Bindless texture of factors of roughness (green) and metal (blue); `NO_TEXTURE`: none.
+    pub reflectance: Vec3,
+    /// Bindless texture of factors of roughness (green) and metal (blue), or with `MATERIAL_SPECULAR_MAP` of the reflectance,
+    /// display-encoded, and of 1 - roughness (alpha); `NO_TEXTURE`: none.
     pub map: u32,
     /// Bindless texture of normals in the tangent space of the texture coordinates. Of `MATERIAL_NORMALS` alone.
     pub normals: u32,
     /// Bindless sampler of both.
     pub sampler_index: u32,
-    /// Factors of the normals' first two components.
+    /// Factors of the normals' first two components; the third completes them to unit length.
     pub normal_scale: Vec2,
     /// Part of the light that the surface mirrors sharply, beside its stages.
     pub mirror: Vec3,

@@ -127,9 +127,17 @@ Gloss body_gloss(SurfacePoint p, Material material, Footprint footprint, out flo
         Lookups lookups = Lookups(vec2(0.0), 1.0, texture_lod(specular.map, p.texel_scale, footprint.width));
         map = texel_mean(specular.map, specular.sampler_index, p.stage.st, lookups);
     }
-    float rough = max(specular.roughness * map.g, LEAST_ROUGHNESS);
-    metal *= map.b;
-    return Gloss(vec3(specular.reflectance), rough * rough);
+    vec3 reflectance = specular.reflectance;
+    float rough;
+    if ((material.flags & MATERIAL_SPECULAR_MAP) != 0) {
+        reflectance *= decode_display(map.rgb);
+        rough = 1.0 - map.a * (1.0 - specular.roughness);
+    } else {
+        rough = specular.roughness * map.g;
+        metal *= map.b;
+    }
+    rough = max(rough, LEAST_ROUGHNESS);
+    return Gloss(reflectance, rough * rough);
 }
 
 // The shading normal of a point, on the side of its face: from the normal map, if the material has one. Tangents follow
@@ -153,9 +161,10 @@ vec3 mapped_normal(SurfacePoint p, Material material, Footprint footprint) {
     vec3 up = cross(p.normal, tangent);
     if (dot(up, along) > 0.0) up = -up;
     Lookups lookups = Lookups(vec2(0.0), 1.0, texture_lod(specular.normals, p.texel_scale, footprint.width));
-    vec3 texel = texel_mean(specular.normals, specular.sampler_index, p.stage.st, lookups).rgb;
-    vec2 slope = (texel.xy * 2.0 - 1.0) * specular.normal_scale;
-    vec3 local = vec3(slope, max(texel.z * 2.0 - 1.0, 0.05));
+    vec2 texel = texel_mean(specular.normals, specular.sampler_index, p.stage.st, lookups).xy;
+    // as `opengl2`: the third component follows from the others
+    vec2 tangential = (texel * 2.0 - 1.0) * specular.normal_scale;
+    vec3 local = vec3(tangential, sqrt(max(1.0 - dot(tangential, tangential), 0.0)));
     return safe_normalize(tangent * local.x + up * local.y + p.normal * local.z, p.normal);
 }
 

@@ -10,60 +10,22 @@
 //! | `mirror NAME R G B` | mirrors this part of the light sharply, beside what its stages show |
 //! | `glass NAME INDEX R G B` | is glass of this refractive index, which lets this part of the light through |
 //! | `emit NAME LIGHT R G B` | shines, as with `q3map_surfacelight LIGHT` and this colour; 0 puts it out |
-//! | `normals NAME IMAGE [SCALE]` | has a normal map |
+//! | `normals NAME IMAGE [SCALE]` | has a normal map; the factor is that of the normals' parts along the surface |
 //! | `surface NAME IMAGE` | has a map of roughness (green) and metal (blue), which multiply those of other lines |
 //! | `plain NAME` | reflects nothing: forgets the lines before, and shows painted reflections as the game does |
 //!
 //! Of several lines that match a name and state the same, the last counts: packs' files follow each other by name, and the
-//! map's file follows them.
+//! map's file follows them. All of them follow what packs state themselves ([`Materials::of_pack`]) and `.mat`
+//! files ([`mat`](super::mat)). `rough` replaces a map of roughness that a pack states.
+//!
+//! [`Materials::of_pack`]: super::Materials::of_pack
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
+use super::finish::{Finish, NormalMap, SurfaceMap};
+use super::mat::Mats;
 use crate::files::GameFiles;
 use crate::hand_written::{LineError, lines, matches, numbers, vector};
-
-/// Reflectance at normal incidence of most materials that are no metal: an index of refraction of 1.5.
-pub const USUAL_REFLECTANCE: f32 = 0.04;
-/// Roughness of metal that nothing else states.
-const USUAL_METAL_ROUGHNESS: f32 = 0.3;
-
-/// How a material reflects, as files state it. What is `None` is as without them.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Finish {
-    /// Perceptual roughness, 0 to 1.
-    pub roughness: Option<f32>,
-    /// Reflectance at normal incidence of the part that is no metal.
-    pub reflectance: Option<f32>,
-    /// Part that is metal, 0 to 1.
-    pub metal: Option<f32>,
-    /// Part of the light that is mirrored sharply, linear.
-    pub mirror: Option<Vec3>,
-    /// Refractive index, and the part of the light that passes, linear.
-    pub glass: Option<(f32, Vec3)>,
-    /// Value and colour of emitted light; the largest channel of the colour is 1.
-    pub emission: Option<(f32, Vec3)>,
-    /// Image of normals, and factor of their slopes.
-    pub normals: Option<(String, f32)>,
-    /// Image with roughness in green and metal in blue.
-    pub surface: Option<String>,
-    /// Nothing is reflected but what later lines state.
-    pub plain: bool,
-}
-
-impl Finish {
-    /// Whether the surface reflects by its roughness.
-    pub fn is_rough(&self) -> bool {
-        self.roughness.is_some() || self.metal.is_some() || self.surface.is_some()
-    }
-
-    /// The roughness: that of a line, of the usual metal, or the whole of a map of it.
-    pub fn roughness_or_usual(&self) -> f32 {
-        self.roughness.unwrap_or(match self.surface {
-            Some(_) => 1.0,
-            None => USUAL_METAL_ROUGHNESS,
-        })
-    }
-}
 
 /// What a line states.
 #[derive(Debug, Clone, PartialEq)]
@@ -91,6 +53,7 @@ struct Rule {
 /// The lines of files of materials, in the order in which they take effect.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MaterialsByHand {
+    mats: Mats,
     rules: Vec<Rule>,
 }
 
@@ -118,43 +81,69 @@ impl MaterialsByHand {
         wrong
     }
 
-    /// Reads `scripts/*.materials`, and the file beside a map. Returns what is wrong with them, one line each.
+    /// Reads `materials/*.mat`, `scripts/*.materials`, and the files of both kinds beside a map. Returns what is wrong with them, one line each.
     pub fn load(files: &dyn GameFiles, map: &str) -> (MaterialsByHand, Vec<String>) {
         let mut all = MaterialsByHand::default();
         let mut faults = Vec::new();
-        let mut names = files.list("scripts", ".materials");
-        names.sort_unstable();
-        let packs = names.iter().map(|name| (format!("scripts/{name}"), false));
-        for (path, of_map) in packs.chain([(materials_file(map), true)]) {
-            match files.read(&path) {
-                Ok(Some(bytes)) => {
-                    let wrong = all.add(&String::from_utf8_lossy(&bytes), of_map);
-                    faults.extend(wrong.iter().map(|e| format!("{path}: {e}")));
+        let stem = map.strip_suffix(".bsp").unwrap_or(map);
+        let sorted = |folder: &str, extension: &str| {
+            let mut names = files.list(folder, extension);
+            names.sort_unstable();
+            let path = |name| format!("{folder}/{name}");
+            names.into_iter().map(path).collect::<Vec<_>>()
+        };
+        let mut each = |paths: Vec<String>, add: &mut dyn FnMut(&str, &str) -> Vec<LineError>| {
+            for path in paths {
+                match files.read(&path) {
+                    Ok(Some(bytes)) => {
+                        let wrong = add(&path, &String::from_utf8_lossy(&bytes));
+                        faults.extend(wrong.iter().map(|e| format!("{path}: {e}")));
+                    }
+                    Ok(None) => {}
+                    Err(problem) => faults.push(problem.to_string()),
                 }
-                Ok(None) => {}
-                Err(problem) => faults.push(problem.to_string()),
             }
-        }
+        };
+        let mut mats = sorted("materials", ".mat");
+        mats.push(format!("{stem}.mat"));
+        each(mats, &mut |_, text| all.mats.add(text));
+        let own = materials_file(map);
+        let mut lines = sorted("scripts", ".materials");
+        lines.push(own.clone());
+        each(lines, &mut |path, text| all.add(text, path == own));
         (all, faults)
     }
 
-    /// What the lines state of a material.
-    pub fn finish(&self, name: &str) -> Finish {
-        let mut finish = Finish::default();
+    /// What the files state of a material, over what its pack states.
+    pub fn finish(&self, name: &str, of_pack: &Finish) -> Finish {
+        let mut finish = of_pack.clone();
+        if let Some(mat) = self.mats.finish(name) {
+            finish.overlay(&mat);
+        }
+        let of_pack = finish.surface.clone();
         for rule in self.rules.iter().filter(|r| matches(&r.pattern, name)) {
             match &rule.statement {
                 Statement::Rough(roughness, reflectance) => {
+                    if finish.surface == of_pack {
+                        finish.surface = None;
+                        finish.reflectance = None;
+                    }
                     finish.roughness = Some(*roughness);
-                    finish.reflectance = reflectance.or(finish.reflectance);
+                    finish.reflectance = reflectance.map(Vec3::splat).or(finish.reflectance);
                 }
                 Statement::Metal(part) => finish.metal = Some(*part),
                 Statement::Mirror(part) => finish.mirror = Some(*part),
                 Statement::Glass(index, part) => finish.glass = Some((*index, *part)),
                 Statement::Emit(value, color) => finish.emission = Some((*value, *color)),
                 Statement::Normals(image, scale) => {
-                    finish.normals = Some((image.clone(), *scale));
+                    finish.normals = Some(NormalMap {
+                        image: image.clone(),
+                        scale: Vec2::splat(*scale),
+                    });
                 }
-                Statement::Surface(image) => finish.surface = Some(image.clone()),
+                Statement::Surface(image) => {
+                    finish.surface = Some(SurfaceMap::RoughnessMetal(image.clone()));
+                }
                 Statement::Plain => {
                     finish = Finish {
                         plain: true,
@@ -289,22 +278,33 @@ mod tests {
                     normals *steel textures/n_n 0.5\nsurface *steel textures/n_rm\nglass *pane 1.5 0.9 1 0.9\n";
         let (file, wrong) = MaterialsByHand::parse(text);
         assert_eq!(wrong, []);
-        let steel = file.finish("textures/base/STEEL");
+        let steel = file.finish("textures/base/STEEL", &Finish::default());
         assert_eq!((steel.roughness, steel.metal), (Some(0.8), Some(1.0)));
         assert_eq!(steel.mirror, Some(Vec3::new(0.2, 0.3, 0.4)));
-        assert_eq!(steel.normals, Some(("textures/n_n".to_owned(), 0.5)));
-        assert_eq!(steel.surface.as_deref(), Some("textures/n_rm"));
-        let wet = file.finish("textures/steel_wet");
-        assert_eq!((wet.roughness, wet.reflectance), (Some(0.1), Some(0.02)));
-        let rusty = file.finish("textures/steel_rusty");
+        let normals = NormalMap {
+            image: "textures/n_n".to_owned(),
+            scale: Vec2::splat(0.5),
+        };
+        assert_eq!(steel.normals, Some(normals));
+        let surface = SurfaceMap::RoughnessMetal("textures/n_rm".to_owned());
+        assert_eq!(steel.surface, Some(surface));
+        let wet = file.finish("textures/steel_wet", &Finish::default());
+        assert_eq!(
+            (wet.roughness, wet.reflectance),
+            (Some(0.1), Some(Vec3::splat(0.02)))
+        );
+        let rusty = file.finish("textures/steel_rusty", &Finish::default());
         assert!(rusty.plain && !rusty.is_rough());
-        let lamp = file.finish("textures/lamp");
+        let lamp = file.finish("textures/lamp", &Finish::default());
         assert_eq!(lamp.emission, Some((300.0, Vec3::new(1.0, 0.5, 0.0))));
         assert_eq!(
-            file.finish("a_pane").glass,
+            file.finish("a_pane", &Finish::default()).glass,
             Some((1.5, Vec3::new(0.9, 1.0, 0.9)))
         );
-        assert_eq!(file.finish("models/x"), Finish::default());
+        assert_eq!(
+            file.finish("models/x", &Finish::default()),
+            Finish::default()
+        );
     }
 
     #[test]
@@ -319,7 +319,7 @@ mod tests {
             "line 1: roughness is from 0 to 1, not 1.5"
         );
         assert!(wrong[2].to_string().contains("unknown word \"shiny\""));
-        assert_eq!(file.finish("a").roughness, Some(0.5));
+        assert_eq!(file.finish("a", &Finish::default()).roughness, Some(0.5));
     }
 
     #[test]
@@ -334,11 +334,39 @@ mod tests {
         files
             .insert("maps/x.materials", "\nmetal ab\nmetal q*")
             .unwrap();
-        let (all, faults) = MaterialsByHand::load(&files, "maps/x.bsp");
-        assert_eq!(faults.len(), 1, "{faults:?}");
+        files
+            .insert("materials/m.mat", "d:\nroughness_override 0.1\nd:\nshine 1")
+            .unwrap();
+        files
+            .insert("maps/x.mat", "D:\ntexture_base x\nroughness_override 0.7\n")
+            .unwrap();
+        let (all, mut faults) = MaterialsByHand::load(&files, "maps/x.bsp");
+        assert_eq!(faults.len(), 2, "{faults:?}");
+        assert_eq!(
+            faults.remove(0),
+            "materials/m.mat: line 4: unknown attribute \"shine\""
+        );
         assert!(faults[0].starts_with("scripts/b.materials: line 2: unknown word"));
-        let finish = all.finish("ab");
+        let finish = all.finish("ab", &Finish::default());
         assert_eq!((finish.roughness, finish.metal), (Some(0.2), Some(1.0)));
+        // lines follow what packs and .mat files state; roughness replaces a pack's map of it
+        let map = |image: &str| Some(SurfaceMap::Specular(image.to_owned()));
+        let of_pack = |image: &str| Finish {
+            surface: map(image),
+            reflectance: Some(Vec3::ONE),
+            metal: Some(0.5),
+            ..Finish::default()
+        };
+        assert_eq!(all.finish("c", &of_pack("m")), of_pack("m"));
+        let rough = all.finish("a", &of_pack("m"));
+        assert_eq!(
+            (rough.surface, rough.reflectance, rough.roughness),
+            (None, None, Some(0.2))
+        );
+        assert_eq!(rough.metal, Some(0.5));
+        let of_mat = all.finish("d", &of_pack("m"));
+        assert_eq!(of_mat.roughness, Some(0.7));
+        assert_eq!(of_mat.surface, map("m"));
         let unmatched = all.unmatched("maps/x.bsp", &["ab", "c"]);
         assert_eq!(
             unmatched,

@@ -1,12 +1,13 @@
-//! Applies files of materials (`relight::materials::by_hand`): they override what a material's script decides about its
-//! reflection.
+//! Applies what packs and files of materials state (`relight::materials::finish`): it overrides what a material's stages
+//! decide about its reflection.
 
-use glam::{Vec2, Vec3};
-use relight::materials::by_hand::{Finish, MaterialsByHand, USUAL_REFLECTANCE};
+use glam::Vec3;
+use relight::materials::by_hand::MaterialsByHand;
+use relight::materials::finish::Finish;
 use shaders::types::{Dielectric, Specular, constants as c};
 
 use super::compile::sampler;
-use super::material::Material;
+use super::material::{LightmapClass, Material};
 use super::materials::Materials;
 use super::source::{ImageFlags, ImageSource};
 
@@ -29,10 +30,10 @@ impl Materials {
         by_hand: MaterialsByHand,
         source: &mut dyn ImageSource,
     ) -> Vec<String> {
-        if by_hand == self.by_hand {
+        if self.by_hand.as_ref() == Some(&by_hand) {
             return Vec::new();
         }
-        self.by_hand = by_hand;
+        self.by_hand = Some(by_hand);
         let mut faults = Vec::new();
         for index in 0..self.list.len() {
             faults.extend(self.finish(index, source));
@@ -52,8 +53,13 @@ impl Materials {
     /// Applies the files to a material. Returns what is wrong with its images.
     pub(super) fn finish(&mut self, index: usize, source: &mut dyn ImageSource) -> Vec<String> {
         let mut faults = Vec::new();
-        if let Some(material) = self.list.get_mut(index) {
-            let finish = self.by_hand.finish(&material.name);
+        if let Some(material) = self.list.get_mut(index)
+            && let Some(by_hand) = &self.by_hand
+            && material.lightmap_class != LightmapClass::TwoD
+        {
+            let exists = |image: &str| source.exists(image);
+            let of_pack = (self.scripts).of_pack(&material.name, &material.shader, &exists);
+            let finish = by_hand.finish(&material.name, &of_pack);
             apply(material, &finish, source, &mut faults);
         }
         faults
@@ -100,41 +106,45 @@ fn apply(
         if finish.is_rough() {
             flags |= c::MATERIAL_ROUGH;
             specular.roughness = finish.roughness_or_usual();
-            specular.reflectance = finish.reflectance.unwrap_or(USUAL_REFLECTANCE);
-            specular.metal = match (finish.metal, &finish.surface) {
-                (Some(part), _) => part,
-                (None, Some(_)) => 1.0,
-                (None, None) => 0.0,
-            };
+            specular.reflectance = finish.reflectance_or_usual();
+            specular.metal = finish.metal_or_usual();
         }
-        let mut image = |name: &str, what: &str| {
-            let found = source.image(name, ImageFlags::DATA).map(|(image, _)| image);
-            if found.is_none() {
-                faults.push(format!(
-                    "material {}: {what} {name} is missing or unreadable; the surface stays without it",
-                    material.name
-                ));
-            }
-            found
+        let name = &material.name;
+        let mut missing = |what: String| {
+            faults.push(format!(
+                "material {name}: {what} is missing or unreadable; the surface stays without it"
+            ));
         };
-        if let Some(name) = &finish.surface
-            && let Some(map) = image(name, "map of roughness")
-        {
-            specular.map = map;
+        if let Some(surface) = &finish.surface {
+            match source.surface_map(surface) {
+                Some(map) => {
+                    specular.map = map;
+                    if surface.is_specular() {
+                        flags |= c::MATERIAL_SPECULAR_MAP;
+                    }
+                }
+                None => {
+                    missing(format!("the map of roughness {surface}"));
+                    if finish.roughness.is_none() && finish.metal.is_none() || surface.is_specular()
+                    {
+                        flags &= !c::MATERIAL_ROUGH;
+                        specular.metal = 0.0;
+                    }
+                }
+            }
         }
-        if let Some((name, scale)) = &finish.normals
-            && let Some(normals) = image(name, "normal map")
-        {
-            let mean = source.mean(normals).truncate();
-            if is_normal_map(mean) {
-                flags |= c::MATERIAL_NORMALS;
-                specular.normals = normals;
-                specular.normal_scale = Vec2::splat(*scale);
-            } else {
-                faults.push(format!(
-                    "material {}: {name} is no normal map: its mean colour is not blue; the surface stays without it",
-                    material.name
-                ));
+        if let Some(map) = &finish.normals {
+            match source.image(&map.image, ImageFlags::DATA) {
+                Some((normals, _)) if is_normal_map(source.mean(normals).truncate()) => {
+                    flags |= c::MATERIAL_NORMALS;
+                    specular.normals = normals;
+                    specular.normal_scale = map.scale;
+                }
+                Some(_) => faults.push(format!(
+                    "material {name}: {} is no normal map: its mean colour is not blue; the surface stays without it",
+                    map.image
+                )),
+                None => missing(format!("the normal map {}", map.image)),
             }
         }
         specular.sampler_index = sampler::REPEAT_MIP;

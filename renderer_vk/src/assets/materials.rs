@@ -78,9 +78,9 @@ pub struct Materials {
     /// Position of each material in `sorted`.
     ranks: Vec<u32>,
     videos: VideoClients,
-    scripts: Arc<relight::Materials>,
-    /// Files of materials.
-    pub(super) by_hand: MaterialsByHand,
+    pub(super) scripts: Arc<relight::Materials>,
+    /// Files of materials; `None` until the first traced view, without which nobody needs what they state.
+    pub(super) by_hand: Option<MaterialsByHand>,
     settings: MaterialSettings,
     internal: Internal,
     cloud_height: f32,
@@ -134,7 +134,7 @@ impl Materials {
             ranks: Vec::new(),
             videos: VideoClients::default(),
             scripts,
-            by_hand: MaterialsByHand::default(),
+            by_hand: None,
             settings,
             internal: Internal::default(),
             cloud_height: 512.0,

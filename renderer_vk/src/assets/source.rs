@@ -1,6 +1,7 @@
 //! Interface of material compilation to its images, so that tests need no GPU.
 
 use glam::Vec4;
+use relight::materials::finish::SurfaceMap;
 
 /// Loading options of an image. The first request determines them, as in the engine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -46,6 +47,10 @@ pub trait ImageSource {
     /// Bindless index of the image that a script or map names, and its flags, which the first request determined.
     /// `None` if there is no usable file.
     fn image(&mut self, name: &str, flags: ImageFlags) -> Option<(u32, ImageFlags)>;
+    /// Bindless index of a map in one of the layouts of [`SurfaceMap::load`]. `None` if an image is missing or unusable.
+    fn surface_map(&mut self, map: &SurfaceMap) -> Option<u32>;
+    /// Whether a file has this image.
+    fn exists(&self, name: &str) -> bool;
     /// The white image.
     fn white(&self) -> u32;
     /// The image of missing textures.

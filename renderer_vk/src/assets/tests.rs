@@ -610,3 +610,55 @@ fn files_of_materials_change_and_restore_materials() {
     assert_eq!(flags(&game), before);
     assert!(!game.materials.has_gloss());
 }
+
+#[test]
+fn packs_state_reflection_in_words_of_opengl2() {
+    use relight::materials::by_hand::MaterialsByHand;
+    let stages = "{\nmap t/a.tga\n}\n{\nmap $lightmap\nblendFunc filter\n}\n";
+    let words = "{\nstage normalMap\nmap t/blue\nnormalScale 0.5\n}\n{\nstage specularMap\nmap t/c\nspecularScale 0.5 0.25\n}\n";
+    let script = format!(
+        "t/wall\n{{\n{stages}}}\nt/pane\n{{\nsurfaceparm trans\n{{\nmap t/a\nblendFunc blend\nroughness 0.1\n}}\n}}\n"
+    );
+    let mtr = format!("t/wall\n{{\n{stages}{words}}}\n");
+    let mut game = Registration::from_entries(&[
+        ("scripts/t.shader", script.as_bytes()),
+        ("scripts/t.mtr", mtr.as_bytes()),
+        ("t/a.tga", PIXEL),
+        ("t/c.tga", PIXEL),
+        ("t/blue.tga", BLUE),
+        ("t/plain.tga", PIXEL),
+        ("t/plain_n.tga", BLUE),
+        ("t/plain_s.tga", PIXEL),
+        ("t/grey.tga", PIXEL),
+        ("t/grey_n.tga", PIXEL),
+    ]);
+    let find = |game: &mut Registration, name| game.find(name, LightmapClass::Page, true);
+    let [wall, pane, plain, grey] =
+        ["t/wall", "t/pane", "t/plain", "t/grey"].map(|name| find(&mut game, name));
+    assert!(!game.materials.has_gloss(), "before a traced view");
+    assert_eq!(game.textures.index("t/plain_n"), None);
+    let faults = (game.materials).set_by_hand(MaterialsByHand::default(), &mut game.textures);
+    assert_eq!(faults.len(), 1, "{faults:?}");
+    assert!(faults[0].contains("t/grey_n is no normal map"));
+    let states = c::MATERIAL_ROUGH | c::MATERIAL_NORMALS | c::MATERIAL_SPECULAR_MAP;
+    let state = |game: &Registration, index| game.materials.get(index).flags & states;
+    assert_eq!(state(&game, wall), states);
+    assert_eq!(state(&game, plain), states);
+    assert_eq!(state(&game, grey), 0);
+    assert_eq!(state(&game, pane), 0, "no body");
+    let specular = game.materials.get(wall).specular;
+    assert_eq!(specular.normal_scale.to_array(), [0.5; 2]);
+    assert_eq!(specular.reflectance.to_array(), [0.5; 3]);
+    assert_eq!((specular.roughness, specular.metal), (0.75, 0.0));
+    let specular = game.materials.get(plain).specular;
+    assert_eq!(specular.reflectance.to_array(), [1.0; 3]);
+    assert_eq!((specular.roughness, specular.metal), (0.0, 0.0));
+    // a file by hand overrides the pack
+    let (file, _) = MaterialsByHand::parse("rough t/wall 0.2\nplain t/plain\n");
+    game.materials.set_by_hand(file, &mut game.textures);
+    let material = game.materials.get(wall);
+    assert_eq!(state(&game, wall), c::MATERIAL_ROUGH | c::MATERIAL_NORMALS);
+    assert_eq!(material.specular.reflectance.to_array(), [0.04; 3]);
+    assert_eq!(material.specular.map, c::NO_TEXTURE);
+    assert_eq!(state(&game, plain), 0);
+}

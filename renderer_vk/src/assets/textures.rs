@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec4};
 use relight::GameFiles;
-use relight::image::{self, Image, default_image};
+use relight::image::{self, Image, ImageError, default_image};
+use relight::materials::finish::SurfaceMap;
 
 use super::alpha::AlphaGrid;
 use super::prepare::{self, TextureSettings};
@@ -172,19 +173,32 @@ impl Textures {
     /// The bindless index of the image `name`, loaded at its first use; `None` if there is no usable file. Names are
     /// compared exactly, and the first request determines the flags, as in the engine.
     pub fn find(&mut self, name: &str, flags: ImageFlags) -> Option<u32> {
+        self.find_by(name, flags, |files| {
+            let Some((image, file)) = image::load(files, name)? else {
+                return Ok(None);
+            };
+            if !file.eq_ignore_ascii_case(name) {
+                log::debug!("{name}: found as {file}");
+            }
+            Ok(Some(image))
+        })
+    }
+
+    /// [`find`](Self::find) with another way to load the image.
+    fn find_by(
+        &mut self,
+        name: &str,
+        flags: ImageFlags,
+        load: impl FnOnce(&dyn GameFiles) -> Result<Option<Image>, ImageError>,
+    ) -> Option<u32> {
         if let Some(texture) = self.by_name.get(name).and_then(|&i| self.textures.get(i)) {
             if texture.flags != flags && texture.image.is_some() {
                 log::debug!("{name}: used with other image flags than before; the first ones stay");
             }
             return texture.image.as_ref().map(gpu::Image::texture_index);
         }
-        let image = match image::load(&*self.files, name) {
-            Ok(Some((image, file))) => {
-                if !file.eq_ignore_ascii_case(name) {
-                    log::debug!("{name}: found as {file}");
-                }
-                self.upload(name, &image, flags)
-            }
+        let image = match load(&*self.files) {
+            Ok(Some(image)) => self.upload(name, &image, flags),
             Ok(None) => None,
             Err(problem) => {
                 log::warn!("{problem}");
@@ -431,6 +445,15 @@ impl ImageSource for Textures {
         let index = self.find(name, flags)?;
         let first = self.by_name.get(name).and_then(|&i| self.textures.get(i));
         Some((index, first.map_or(flags, |texture| texture.flags)))
+    }
+
+    fn surface_map(&mut self, map: &SurfaceMap) -> Option<u32> {
+        // the name of a file cannot be that of a map: it does not end with a parenthesis
+        self.find_by(&map.to_string(), ImageFlags::DATA, |files| map.load(files))
+    }
+
+    fn exists(&self, name: &str) -> bool {
+        image::find(&*self.files, name).is_some()
     }
 
     fn white(&self) -> u32 {

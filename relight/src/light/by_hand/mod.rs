@@ -30,6 +30,7 @@ use super::{
 use crate::files::GameFiles;
 use crate::hand_written::{LineError, lines, numbers, vector};
 use crate::materials::by_hand::MaterialsByHand;
+use crate::materials::finish::Finish;
 use crate::world::{RelitWorld, WorldMaterial};
 use glam::Vec3;
 
@@ -220,7 +221,9 @@ impl RelitWorld {
         let (by_hand, faults) = MaterialsByHand::load(files, &self.name);
         self.warnings.extend(faults);
         let stated = |material: &WorldMaterial| {
-            let (value, color) = by_hand.finish(&material.name).emission?;
+            let (value, color) = by_hand
+                .finish(&material.name, &Finish::default())
+                .emission?;
             Some((
                 material.name.clone(),
                 color * value * SURFACE_LIGHT_RADIANCE,

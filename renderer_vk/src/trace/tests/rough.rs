@@ -26,6 +26,7 @@ gpu_tests! {
         normal_maps_turn_the_surface,
         marks_leave_the_gloss_of_their_surface,
         maps_of_roughness_and_metal_are_factors,
+        maps_of_reflectance_and_smoothness_are_factors,
         a_pane_shows_the_gloss_behind_it,
     ],
 }
@@ -38,7 +39,7 @@ fn shine(scene: &mut Scene, material: u32, roughness: f32, metal: f32, reflectan
     gpu.0.specular = Specular {
         roughness,
         metal,
-        reflectance,
+        reflectance: Vec3::splat(reflectance),
         map: c::NO_TEXTURE,
         normals: c::NO_TEXTURE,
         ..Specular::default()
@@ -305,4 +306,24 @@ fn maps_of_roughness_and_metal_are_factors(gpu: &mut Gpu) {
     let [mapped, stated] = [mapped, stated].map(|scene| gpu.mean(&scene, &reference(), 256).x);
     println!("{mapped} {stated}");
     assert!((mapped / stated - 1.0).abs() < 0.005, "{mapped} {stated}");
+}
+
+fn maps_of_reflectance_and_smoothness_are_factors(gpu: &mut Gpu) {
+    // display-encoded 188 is 0.5 linear; an alpha of 153 is a smoothness of 0.6
+    let image = square(gpu, 2, &[188, 188, 188, 153].repeat(4));
+    let mut mapped = floor_below_a_lamp(0.5);
+    let mut stated = floor_below_a_lamp(1.0 - 0.6 * 0.5);
+    for scene in [&mut mapped, &mut stated] {
+        scene.materials[0].0.specular.metal = 0.0;
+    }
+    mapped.materials[0].0.flags |= c::MATERIAL_SPECULAR_MAP;
+    mapped.materials[0].0.specular.map = image.texture_index();
+    mapped.materials[0].0.specular.reflectance = Vec3::new(0.8, 0.4, 0.1);
+    stated.materials[0].0.specular.reflectance = Vec3::new(0.4, 0.2, 0.05);
+    let [mapped, stated] = [mapped, stated].map(|scene| gpu.mean(&scene, &reference(), 256));
+    println!("{mapped} {stated}");
+    assert!(
+        (mapped / stated - 1.0).abs().max_element() < 0.01,
+        "{mapped} {stated}"
+    );
 }

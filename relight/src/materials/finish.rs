@@ -1,0 +1,260 @@
+//! How a material reflects: what packs and files state, which the engine's scripts cannot.
+
+use std::fmt;
+
+use glam::{Vec2, Vec3};
+
+use crate::files::GameFiles;
+use crate::image::{self, Image, ImageError};
+
+/// Reflectance at normal incidence of most materials that are no metal: an index of refraction of 1.5.
+pub const USUAL_REFLECTANCE: f32 = 0.04;
+/// Roughness of metal that nothing else states.
+const USUAL_METAL_ROUGHNESS: f32 = 0.3;
+
+/// What is stated about a material. What is `None` is as without.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Finish {
+    /// Perceptual roughness, 0 to 1; a factor of that of `surface`.
+    pub roughness: Option<f32>,
+    /// Reflectance at normal incidence of the part that is no metal, linear; a factor of that of `surface`.
+    pub reflectance: Option<Vec3>,
+    /// Part that is metal, 0 to 1; a factor of that of `surface`.
+    pub metal: Option<f32>,
+    /// Part of the light that is mirrored sharply, linear.
+    pub mirror: Option<Vec3>,
+    /// Refractive index, and the part of the light that passes, linear.
+    pub glass: Option<(f32, Vec3)>,
+    /// Value and colour of emitted light; the largest channel of the colour is 1.
+    pub emission: Option<(f32, Vec3)>,
+    /// Normal map.
+    pub normals: Option<NormalMap>,
+    /// Image of roughness, metal or reflectance.
+    pub surface: Option<SurfaceMap>,
+    /// Nothing is reflected but what is stated here.
+    pub plain: bool,
+}
+
+/// An image of normals in tangent space: x to the right of the image, y up, as in OpenGL.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NormalMap {
+    /// Its name.
+    pub image: String,
+    /// Factors of the first two components; the third completes them to unit length.
+    pub scale: Vec2,
+}
+
+impl Finish {
+    /// Whether the surface reflects by its roughness.
+    pub fn is_rough(&self) -> bool {
+        self.roughness.is_some() || self.metal.is_some() || self.surface.is_some()
+    }
+
+    /// The roughness: as stated, or that of the usual metal, or such that a map decides alone.
+    pub fn roughness_or_usual(&self) -> f32 {
+        let usual = match &self.surface {
+            Some(map) if map.is_specular() => 0.0,
+            Some(_) => 1.0,
+            None => USUAL_METAL_ROUGHNESS,
+        };
+        self.roughness.unwrap_or(usual)
+    }
+
+    /// The reflectance of the part that is no metal.
+    pub fn reflectance_or_usual(&self) -> Vec3 {
+        let usual = match &self.surface {
+            Some(map) if map.is_specular() => 1.0,
+            _ => USUAL_REFLECTANCE,
+        };
+        self.reflectance.unwrap_or(Vec3::splat(usual))
+    }
+
+    /// The part that is metal.
+    pub fn metal_or_usual(&self) -> f32 {
+        let usual = match &self.surface {
+            Some(map) if !map.is_specular() => 1.0,
+            _ => 0.0,
+        };
+        self.metal.unwrap_or(usual)
+    }
+
+    /// What another states replaces what this one states.
+    pub(super) fn overlay(&mut self, other: &Finish) {
+        let Finish {
+            roughness,
+            reflectance,
+            metal,
+            mirror,
+            glass,
+            emission,
+            normals,
+            surface,
+            plain,
+        } = other.clone();
+        self.roughness = roughness.or(self.roughness);
+        self.reflectance = reflectance.or(self.reflectance);
+        self.metal = metal.or(self.metal);
+        self.mirror = mirror.or(self.mirror);
+        self.glass = glass.or(self.glass);
+        self.emission = emission.or(self.emission);
+        self.normals = normals.or_else(|| self.normals.take());
+        self.surface = surface.or_else(|| self.surface.take());
+        self.plain |= plain;
+    }
+}
+
+/// Images that vary roughness, metal or reflectance over a surface, in the layouts that are in use.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum SurfaceMap {
+    /// Roughness in green and metal in blue, as in glTF.
+    RoughnessMetal(String),
+    /// Smoothness in red and metal in green: `specularMap` of `opengl2` with `r_pbr 1`.
+    SmoothnessMetal(String),
+    /// Colour of the reflection, display-encoded, and smoothness in alpha: `specularMap` of `opengl2`.
+    Specular(String),
+    /// Roughness and metal in the alpha of two images: `.mat` files of Quake II RTX.
+    Alphas {
+        /// Image with roughness in its alpha; 1 without.
+        roughness: Option<String>,
+        /// Image with metal in its alpha.
+        metal: String,
+    },
+}
+
+impl fmt::Display for SurfaceMap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            SurfaceMap::RoughnessMetal(image) => write!(f, "{image}"),
+            SurfaceMap::SmoothnessMetal(image) => write!(f, "{image} (smoothness and metal)"),
+            SurfaceMap::Specular(image) => write!(f, "{image} (reflectance and smoothness)"),
+            SurfaceMap::Alphas {
+                roughness: None,
+                metal,
+            } => write!(f, "{metal} (alpha)"),
+            SurfaceMap::Alphas {
+                roughness: Some(image),
+                metal,
+            } => write!(f, "{metal} and {image} (alpha)"),
+        }
+    }
+}
+
+impl SurfaceMap {
+    /// Whether [`load`](Self::load) returns reflectance and smoothness, not roughness and metal.
+    pub fn is_specular(&self) -> bool {
+        matches!(self, SurfaceMap::Specular(_))
+    }
+
+    /// Loads it in one of two layouts: roughness in green and metal in blue, or, if it [is](Self::is_specular) specular,
+    /// reflectance, display-encoded, with smoothness in alpha. `None` if an image of it is missing.
+    ///
+    /// # Errors
+    /// An image cannot be read.
+    pub fn load(&self, files: &dyn GameFiles) -> Result<Option<Image>, ImageError> {
+        let image = |name: &str| Ok::<_, ImageError>(image::load(files, name)?.map(|(i, _)| i));
+        let each = |mut image: Image, texel: fn([u8; 4]) -> [u8; 4]| {
+            for pixel in image.rgba.as_chunks_mut().0 {
+                *pixel = texel(*pixel);
+            }
+            image
+        };
+        Ok(match self {
+            SurfaceMap::RoughnessMetal(name) | SurfaceMap::Specular(name) => image(name)?,
+            SurfaceMap::SmoothnessMetal(name) => {
+                image(name)?.map(|i| each(i, |[r, g, _, _]| [255, 255 - r, g, 255]))
+            }
+            SurfaceMap::Alphas { roughness, metal } => {
+                let metal = image(metal)?;
+                let rough = match roughness {
+                    Some(name) => image(name)?,
+                    None => Some(Image::uniform([255; 4])),
+                };
+                metal
+                    .zip(rough)
+                    .map(|(metal, rough)| of_alphas(&rough, &metal))
+            }
+        })
+    }
+}
+
+/// Roughness (green) and metal (blue) from the alpha of two images, in the larger one's size.
+fn of_alphas(roughness: &Image, metal: &Image) -> Image {
+    let (width, height) = (
+        roughness.width.max(metal.width),
+        roughness.height.max(metal.height),
+    );
+    let alpha = |image: &Image, x: u32, y: u32| {
+        let at =
+            |k: u32, side: u32, of: u32| (u64::from(k) * u64::from(side) / u64::from(of)) as usize;
+        let index = at(y, image.height, height) * image.width as usize + at(x, image.width, width);
+        (image.rgba.as_chunks::<4>().0.get(index)).map_or(255, |[_, _, _, a]| *a)
+    };
+    let mut out = Image::uniform([255; 4]);
+    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    let rgba = pixels.flat_map(|(x, y)| [255, alpha(roughness, x, y), alpha(metal, x, y), 255]);
+    if let Some(image) = Image::from_rgba(width, height, rgba.collect()) {
+        out = image;
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::MemoryFiles;
+
+    /// A TGA of 32 bits with these pixels (RGBA), in one row.
+    fn tga(pixels: &[[u8; 4]]) -> Vec<u8> {
+        let mut bytes = vec![0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0];
+        bytes.extend((pixels.len() as u16).to_le_bytes());
+        bytes.extend([1, 0, 32, 8]);
+        bytes.extend(pixels.iter().flat_map(|&[r, g, b, a]| [b, g, r, a]));
+        bytes
+    }
+
+    #[test]
+    fn layouts_become_two() {
+        let mut files = MemoryFiles::new();
+        files.insert("a.tga", tga(&[[10, 20, 30, 40]])).unwrap();
+        files
+            .insert("b.tga", tga(&[[0, 0, 0, 1], [0, 0, 0, 2]]))
+            .unwrap();
+        let load = |map: SurfaceMap| map.load(&files).unwrap().map(|image| image.rgba);
+        let name = || "a.tga".to_owned();
+        let stored = Some(vec![10, 20, 30, 40]);
+        assert_eq!(load(SurfaceMap::RoughnessMetal(name())), stored);
+        assert_eq!(load(SurfaceMap::Specular(name())), stored);
+        let smooth = load(SurfaceMap::SmoothnessMetal(name()));
+        assert_eq!(smooth, Some(vec![255, 245, 20, 255]));
+        let alphas = |roughness: Option<&str>, metal: &str| SurfaceMap::Alphas {
+            roughness: roughness.map(str::to_owned),
+            metal: metal.to_owned(),
+        };
+        assert_eq!(load(alphas(None, "a")), Some(vec![255, 255, 40, 255]));
+        // the smaller image is stretched
+        let both = load(alphas(Some("a"), "b"));
+        assert_eq!(both, Some(vec![255, 40, 1, 255, 255, 40, 2, 255]));
+        assert_eq!(load(alphas(Some("none"), "b")), None);
+        assert_eq!(load(SurfaceMap::Specular("none".to_owned())), None);
+    }
+
+    #[test]
+    fn what_is_not_stated_leaves_maps_alone() {
+        let of = |surface| Finish {
+            surface,
+            ..Finish::default()
+        };
+        let values = |f: Finish| {
+            (
+                f.roughness_or_usual(),
+                f.reflectance_or_usual().x,
+                f.metal_or_usual(),
+            )
+        };
+        assert_eq!(values(of(None)), (USUAL_METAL_ROUGHNESS, 0.04, 0.0));
+        let specular = SurfaceMap::Specular(String::new());
+        assert_eq!(values(of(Some(specular))), (0.0, 1.0, 0.0));
+        let metal = SurfaceMap::RoughnessMetal(String::new());
+        assert_eq!(values(of(Some(metal))), (1.0, 0.04, 1.0));
+    }
+}
