@@ -4,6 +4,7 @@
 #include "trace/path.glsl"
 #include "trace/dielectric.glsl"
 #include "trace/portal.glsl"
+#include "trace/specular.glsl"
 
 // `PATHS_*` number of paths that pass a portal after `paths`; `scene/turned.rs` numbers them the same way.
 uint paths_through(uint paths, uint portal) {
@@ -97,7 +98,15 @@ struct Interface {
     uint bend;
     bool refracts;
     bool enters;
+    float frost; // width of the distribution of its microfacets; 0: smooth
 };
+
+// A microfacet's normal of frosted glass. While frames accumulate, every frame samples another one; live, a pixel keeps
+// its own, because a surface that jumps between frames has no history.
+vec3 frosted_normal(float alpha, vec3 normal, vec3 to_viewer) {
+    vec2 u = (VIEW.flags & VIEW_ACCUMULATE) != 0 ? rng_next2() : vec2(unit_float(rng_seed()), unit_float(rng_seed()));
+    return sample_facet(alpha, normal, to_viewer, u);
+}
 
 Interface interface_at(Path path, SurfacePoint p, Material material, float width) {
     Dielectric dielectric = material.dielectric;
@@ -114,6 +123,14 @@ Interface interface_at(Path path, SurfacePoint p, Material material, float width
         cosine = -dot(i.face, path.direction);
     }
     i.bend = dielectric.ripple > 0.0 ? BENT_BY_RIPPLES : BENT_BY_SHAPE;
+    i.frost = 0.0;
+    if (HAS_GLOSS != 0 && (material.flags & MATERIAL_ROUGH) != 0) {
+        float rough = max(material.specular.roughness, LEAST_ROUGHNESS);
+        i.frost = rough * rough;
+        i.normal = frosted_normal(i.frost, i.normal, -path.direction);
+        cosine = max(-dot(i.normal, path.direction), 0.0);
+        i.bend = BENT_BY_RIPPLES;
+    }
     i.eta = !i.refracts || i.enters ? dielectric.index : 1.0 / dielectric.index;
     i.mirrored = dielectric_reflectance(material, p, cosine, i.eta);
     return i;
@@ -131,6 +148,16 @@ bool pass_interface(inout Path path, SurfacePoint p, Interface i, SeenLayer seen
     path.weight *= weight;
     if (follows) reflect_path(path, p, t, i.face, i.normal, i.bend);
     return follows;
+}
+
+// Continues the path behind a frosted pane: it enters by the smooth face and leaves by the rough one.
+void scatter_path(inout Path path, SurfacePoint p, Interface i, float t) {
+    vec3 inside = refract(path.direction, i.face, 1.0 / i.eta);
+    vec3 scattered = refract(inside, frosted_normal(i.frost, i.face, -inside), i.eta);
+    // total reflection, or a direction back into the pane: it is scattered on until it leaves; here it passes straight
+    if (dot(scattered, i.face) >= 0.0) scattered = path.direction;
+    path.bent = max(path.bent, i.bend);
+    redirect_path(path, p, t, -i.face, normalize(scattered));
 }
 
 // Continues the path refracted, on the other side of the surface of a liquid.

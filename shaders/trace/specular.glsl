@@ -103,19 +103,23 @@ vec3 gloss_weight(Gloss gloss, GlossView view, vec3 direction) {
     return schlick(gloss.reflectance, dot(view.to_viewer, half_way)) * compensation(gloss, whole) * shadowing;
 }
 
-// Samples a direction of reflected light by the distribution of visible normals (Dupuy and Benyoub, Sampling Visible GGX
-// Normals with Spherical Caps, 2023). It may lead into the surface; its weight is 0 then.
-vec3 gloss_direction(Gloss gloss, GlossView view, vec2 u) {
+// Samples a microfacet's normal by the distribution of visible normals (Dupuy and Benyoub, Sampling Visible GGX Normals
+// with Spherical Caps, 2023). `normal`: on the side of `to_viewer`.
+vec3 sample_facet(float alpha, vec3 normal, vec3 to_viewer, vec2 u) {
     vec3 t, b;
-    basis(view.normal, t, b);
-    vec3 seen = vec3(dot(view.to_viewer, t), dot(view.to_viewer, b), view.cosine);
-    vec3 stretched = normalize(vec3(seen.xy * gloss.alpha, seen.z));
+    basis(normal, t, b);
+    vec3 seen = vec3(dot(to_viewer, t), dot(to_viewer, b), dot(to_viewer, normal));
+    vec3 stretched = normalize(vec3(seen.xy * alpha, seen.z));
     float phi = 2.0 * PI * u.x, z = fma(1.0 - u.y, 1.0 + stretched.z, -stretched.z);
     float r = sqrt(clamp(1.0 - z * z, 0.0, 1.0));
     vec3 facet = vec3(r * cos(phi), r * sin(phi), z) + stretched;
-    facet = normalize(vec3(facet.xy * gloss.alpha, max(facet.z, 1.0e-6)));
-    vec3 normal = t * facet.x + b * facet.y + view.normal * facet.z;
-    return normalize(reflect(-view.to_viewer, normal));
+    facet = normalize(vec3(facet.xy * alpha, max(facet.z, 1.0e-6)));
+    return t * facet.x + b * facet.y + normal * facet.z;
+}
+
+// Samples a direction of reflected light. It may lead into the surface; its weight is 0 then.
+vec3 gloss_direction(Gloss gloss, GlossView view, vec2 u) {
+    return normalize(reflect(-view.to_viewer, sample_facet(gloss.alpha, view.normal, view.to_viewer, u)));
 }
 
 // The gloss of a point, of its part that is no metal; `metal`: the other part.

@@ -102,6 +102,10 @@ fn apply(
             filter_color: part,
             ..Dielectric::default()
         };
+        if let Some(roughness) = finish.roughness {
+            flags |= c::MATERIAL_ROUGH;
+            specular.roughness = roughness;
+        }
     } else if has_body(flags) && flags & c::MATERIAL_TRANSLUCENT == 0 {
         if finish.is_rough() {
             flags |= c::MATERIAL_ROUGH;

@@ -28,6 +28,7 @@ gpu_tests! {
         maps_of_roughness_and_metal_are_factors,
         maps_of_reflectance_and_smoothness_are_factors,
         a_pane_shows_the_gloss_behind_it,
+        frosted_panes_scatter_what_is_behind_them,
     ],
 }
 
@@ -326,4 +327,52 @@ fn maps_of_reflectance_and_smoothness_are_factors(gpu: &mut Gpu) {
         (mapped / stated - 1.0).abs().max_element() < 0.01,
         "{mapped} {stated}"
     );
+}
+
+/// A pane before a floor that glows where y < 0, or everywhere; columns of pixels from left to right.
+fn behind_a_pane(gpu: &mut Gpu, roughness: f32, whole: bool) -> Vec<f32> {
+    let mut scene = Scene::new(Vec3::new(0.0, 0.0, 60.0), Vec3::ZERO, 40.0, 8);
+    let glow = scene.material(&[stage::constant([1.0; 3])], 0);
+    let dark = scene.material(&[stage::constant([0.0; 3])], 0);
+    for (y, material) in [(-400.0, glow), (0.0, if whole { glow } else { dark })] {
+        let corner = Vec3::new(-400.0, y, 0.0);
+        scene.quad(
+            rectangle(corner, Vec3::X * 800.0, Vec3::Y * 400.0),
+            material,
+        );
+    }
+    let flags = c::MATERIAL_GLASS | c::MATERIAL_TRANSLUCENT | c::MATERIAL_ROUGH;
+    let pane = scene.material(&[stage::filter([1.0; 3])], flags);
+    scene.materials[pane as usize].0.dielectric = Dielectric {
+        index: 1.5,
+        scale: 1.0,
+        ..Dielectric::default()
+    };
+    scene.materials[pane as usize].0.specular.roughness = roughness;
+    scene.quad(floor_at(20.0, 400.0), pane);
+    let (pixels, _) = gpu.render(&scene, &reference(), 256);
+    let column = |x: usize| (0..8).map(|y| pixels[y * 8 + x].x).sum::<f32>() / 8.0;
+    (0..8).map(column).collect()
+}
+
+fn frosted_panes_scatter_what_is_behind_them(gpu: &mut Gpu) {
+    let pixel = 60.0 * 20.0_f32.to_radians().tan() / 4.0;
+    for roughness in [0.0, 0.3] {
+        let whole = behind_a_pane(gpu, roughness, true);
+        let half = behind_a_pane(gpu, roughness, false);
+        println!("{roughness}: {whole:?} {half:?}");
+        let mean = whole.iter().sum::<f32>() / 8.0;
+        // a pane of index 1.5 passes 12/13
+        assert!((mean * 13.0 / 12.0 - 1.0).abs() < 0.005, "{mean}");
+        // A ray that leaves by a facet of the slope s turns by (1.5 - 1) s, and GGX has a slope above x in one direction
+        // with the probability (1 - x / sqrt(x^2 + alpha^2)) / 2. In the first pixel beyond the edge its mean is:
+        let k = 20.0 * 0.5 * roughness * roughness;
+        let exact = 0.5 * (1.0 - ((pixel * pixel + k * k).sqrt() - k) / pixel) * mean;
+        let beyond = half[3];
+        assert!(
+            (beyond - exact).abs() < 0.05 * exact + 0.004,
+            "{beyond} {exact}"
+        );
+        assert!((half[3] + half[4] - mean).abs() < 0.01, "{half:?}");
+    }
 }
