@@ -7,9 +7,11 @@ use clap::Args;
 use glam::Vec3;
 use q3bsp::Bsp;
 use relight::GameFiles;
+use relight::sample::Sample;
 
 use crate::game::Game;
 use crate::numbers;
+use crate::sample::parse_sample;
 use crate::view::{Camera, open};
 
 // No documentation comments on these structures: clap would show them in place of the subcommand's description.
@@ -20,9 +22,10 @@ pub struct ChosenMap {
     /// The map: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp file, a pack (.pk3) with one map, or pack.pk3:maps/x.bsp
     #[arg(required_unless_present = "sample", value_name = "MAP")]
     pub map: Option<String>,
-    /// Use the built-in sample map
-    #[arg(long, conflicts_with = "map")]
-    pub sample: bool,
+    /// Use a built-in map: hall, which is the default, or surfaces
+    #[arg(long, conflicts_with = "map", num_args = 0..=1, default_missing_value = "hall", value_parser = parse_sample,
+        value_name = "NAME")]
+    pub sample: Option<Sample>,
     #[command(flatten)]
     pub game: Game,
 }
@@ -37,8 +40,9 @@ impl ChosenMap {
             Some(map) => open(map, &self.game),
             // `clap` demands a map without `--sample`
             None => {
-                let files = Arc::new(relight::sample::files()?) as Arc<dyn GameFiles>;
-                Ok((files, relight::sample::MAP.to_owned()))
+                let sample = self.sample.unwrap_or_default();
+                let files = Arc::new(sample.files()?) as Arc<dyn GameFiles>;
+                Ok((files, sample.map().to_owned()))
             }
         }
     }

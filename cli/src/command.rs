@@ -7,7 +7,7 @@ use clap::{Parser, Subcommand};
 
 use crate::outcome::parse;
 use crate::{
-    calibration, cameras, compare, convert, info, lights, material, render, report, viewer,
+    calibration, cameras, compare, convert, info, lights, material, render, report, sample, viewer,
 };
 
 /// Maps of id Tech 3 games: contents, conversion, pictures with new light
@@ -30,6 +30,7 @@ enum Command {
     Material(material::MaterialArgs),
     Render(Box<render::RenderArgs>),
     Report(report::ReportArgs),
+    Sample(sample::SampleArgs),
     View(Box<viewer::ViewArgs>),
 }
 
@@ -65,6 +66,7 @@ pub fn run() -> Result<ExitCode> {
         Command::Material(args) => return material::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Report(args) => report::run(&args),
+        Command::Sample(args) => sample::run(&args),
         Command::View(args) => viewer::run(&args),
     }?;
     Ok(ExitCode::SUCCESS)

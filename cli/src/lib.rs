@@ -27,6 +27,7 @@ mod outcome;
 mod pictures;
 mod render;
 mod report;
+mod sample;
 mod scripts;
 mod settings;
 mod surfaces;

@@ -276,12 +276,12 @@ mod tests {
 
     #[test]
     fn the_sample_map_can_be_drawn_both_ways() {
-        let files = relight::sample::files().unwrap();
+        let files = relight::sample::Sample::Hall.files().unwrap();
         let (materials, _) = Materials::load(&files);
         let world = RelitWorld::load(
             &files,
             &materials,
-            relight::sample::MAP,
+            relight::sample::Sample::Hall.map(),
             Options {
                 calibrate: None,
                 ..Options::default()

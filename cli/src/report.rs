@@ -59,8 +59,8 @@ pub fn run(args: &ReportArgs) -> Result<()> {
     let (files, map) = match &args.map {
         Some(map) => open(map, &args.game)?,
         None => (
-            Arc::new(relight::sample::files()?) as Arc<dyn GameFiles>,
-            relight::sample::MAP.to_owned(),
+            Arc::new(relight::sample::Sample::Hall.files()?) as Arc<dyn GameFiles>,
+            relight::sample::Sample::Hall.map().to_owned(),
         ),
     };
     let mut about = vec![format!("map: {map}")];

@@ -130,7 +130,8 @@ fn is_free(probe: &Probe, origin: Vec3, direction: Vec3, length: f32) -> bool {
 mod tests {
     use super::*;
     use egui::RawInput;
-    use relight::{Materials, Options, RelitWorld, sample};
+    use relight::sample::Sample;
+    use relight::{Materials, Options, RelitWorld};
 
     fn held(keys: &[Key]) -> InputState {
         let context = egui::Context::default();
@@ -166,13 +167,13 @@ mod tests {
 
     #[test]
     fn a_walker_stands_on_the_floor_and_stops_at_walls() {
-        let files = sample::files().unwrap();
+        let files = Sample::Hall.files().unwrap();
         let (materials, _) = Materials::load(&files);
         let options = Options {
             calibrate: None,
             ..Options::default()
         };
-        let world = RelitWorld::load(&files, &materials, sample::MAP, options).unwrap();
+        let world = RelitWorld::load(&files, &materials, Sample::Hall.map(), options).unwrap();
         let probe = Probe::new(&world);
         let entities = world.bsp.entities();
         let spawn = relight::viewpoints::spawn_views(&entities).next().unwrap();

@@ -191,16 +191,17 @@ pub fn shown_on_white(irradiance: Vec3) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Materials, Options, sample};
+    use crate::sample::Sample;
+    use crate::{Materials, Options};
 
     fn world() -> RelitWorld {
-        let files = sample::files().unwrap();
+        let files = Sample::Hall.files().unwrap();
         let (materials, _) = Materials::load(&files);
         let options = Options {
             calibrate: None,
             ..Options::default()
         };
-        RelitWorld::load(&files, &materials, sample::MAP, options).unwrap()
+        RelitWorld::load(&files, &materials, Sample::Hall.map(), options).unwrap()
     }
 
     #[test]

@@ -41,14 +41,19 @@ fn model() -> Vec<u8> {
 
 /// The sample's map with more entities.
 fn files(entities: &str) -> MemoryFiles {
-    let mut files = relight::sample::files().unwrap();
-    let bytes = files.read(relight::sample::MAP).unwrap().unwrap();
+    let mut files = relight::sample::Sample::Hall.files().unwrap();
+    let bytes = files
+        .read(relight::sample::Sample::Hall.map())
+        .unwrap()
+        .unwrap();
     let mut bsp = q3bsp::Bsp::parse(&bytes).unwrap();
     while bsp.entities.last() == Some(&0) {
         bsp.entities.pop();
     }
     bsp.entities.extend_from_slice(entities.as_bytes());
-    files.insert(relight::sample::MAP, bsp.write()).unwrap();
+    files
+        .insert(relight::sample::Sample::Hall.map(), bsp.write())
+        .unwrap();
     files.insert("models/t/Thing.md3", model()).unwrap();
     files.insert("models/t/cut.md3", &model()[..200]).unwrap();
     files
@@ -60,7 +65,13 @@ fn write(files: &MemoryFiles) -> (tempfile::TempDir, ExportReport, RelitWorld) {
         calibrate: None,
         ..Options::default()
     };
-    let world = RelitWorld::load(files, &materials, relight::sample::MAP, options).unwrap();
+    let world = RelitWorld::load(
+        files,
+        &materials,
+        relight::sample::Sample::Hall.map(),
+        options,
+    )
+    .unwrap();
     let folder = tempfile::tempdir().unwrap();
     let source = Export {
         world: &world,

@@ -276,13 +276,18 @@ fn agree(written: &Written, name: &str) {
 
 #[test]
 fn the_sample_is_the_map() {
-    let files = relight::sample::files().unwrap();
+    let files = relight::sample::Sample::Hall.files().unwrap();
     let lit = ExportOptions {
         lightmaps: Lightmaps::Strip,
         lights: true,
         ..ExportOptions::default()
     };
-    let written = write(&files, relight::sample::MAP, Format::Glb, lit);
+    let written = write(
+        &files,
+        relight::sample::Sample::Hall.map(),
+        Format::Glb,
+        lit,
+    );
     agree(&written, "sample");
     let (document, ..) = gltf::import(&written.path).unwrap();
     let material = |name: &str| {
@@ -308,12 +313,17 @@ fn the_sample_is_the_map() {
 
 #[test]
 fn images_are_stored_once_and_lightmaps_can_be_left_out() {
-    let files = relight::sample::files().unwrap();
+    let files = relight::sample::Sample::Hall.files().unwrap();
     let options = ExportOptions {
         images: ImagePlace::Beside,
         ..ExportOptions::default()
     };
-    let written = write(&files, relight::sample::MAP, Format::Gltf, options);
+    let written = write(
+        &files,
+        relight::sample::Sample::Hall.map(),
+        Format::Gltf,
+        options,
+    );
     let mut contents = HashSet::new();
     let images = |path: &Path| path.extension().is_some_and(|e| e == "png" || e == "jpg");
     let mut count = 0;
@@ -334,7 +344,12 @@ fn images_are_stored_once_and_lightmaps_can_be_left_out() {
             lightmaps,
             ..options
         };
-        let written = write(&files, relight::sample::MAP, Format::Gltf, options);
+        let written = write(
+            &files,
+            relight::sample::Sample::Hall.map(),
+            Format::Gltf,
+            options,
+        );
         let text = std::fs::read_to_string(&written.path).unwrap();
         (written.report.images, text)
     };
@@ -350,9 +365,14 @@ fn images_are_stored_once_and_lightmaps_can_be_left_out() {
 
 #[test]
 fn by_default_every_program_shows_the_light() {
-    let files = relight::sample::files().unwrap();
+    let files = relight::sample::Sample::Hall.files().unwrap();
     let options = ExportOptions::default();
-    let written = write(&files, relight::sample::MAP, Format::Glb, options);
+    let written = write(
+        &files,
+        relight::sample::Sample::Hall.map(),
+        Format::Glb,
+        options,
+    );
     agree(&written, "sample");
     let (document, buffers, _) = gltf::import(&written.path).unwrap();
     let (mut dark, mut bright, mut mean, mut count) = (0, 0, 0.0, 0.0);
@@ -381,10 +401,10 @@ fn by_default_every_program_shows_the_light() {
 
 #[test]
 fn obj_has_every_triangle() {
-    let files = relight::sample::files().unwrap();
+    let files = relight::sample::Sample::Hall.files().unwrap();
     let written = write(
         &files,
-        relight::sample::MAP,
+        relight::sample::Sample::Hall.map(),
         Format::Obj,
         ExportOptions::default(),
     );

@@ -126,10 +126,20 @@ fn samplers_are_numbered_from_zero() {
 fn the_sample_map_loads_and_gathers() {
     let Some(device) = device() else { return };
     let settings = Settings::full_size();
-    let mut assets = assets(&device, relight::sample::files().unwrap(), &settings);
+    let mut assets = assets(
+        &device,
+        relight::sample::Sample::Hall.files().unwrap(),
+        &settings,
+    );
     let missing = World::load(&device, &mut assets, "maps/none.bsp", &settings);
     assert!(matches!(missing, Err(WorldError::Map(_))));
-    let world = World::load(&device, &mut assets, relight::sample::MAP, &settings).unwrap();
+    let world = World::load(
+        &device,
+        &mut assets,
+        relight::sample::Sample::Hall.map(),
+        &settings,
+    )
+    .unwrap();
     assert!(world.vertex_buffer.size() as usize >= size_of_val(world.vertices.as_slice()));
     let bytes = device
         .read_buffer(&world.index_buffer, 0, world.indices.len() as u64 * 4)

@@ -293,10 +293,11 @@ fn kind(path: &Path) -> Option<Changed> {
 mod tests {
     use super::*;
     use crate::game::Game;
+    use relight::sample::Sample;
 
     fn chosen(map: Option<String>) -> ChosenMap {
         ChosenMap {
-            sample: map.is_none(),
+            sample: map.is_none().then_some(Sample::Hall),
             map,
             game: Game { paths: Vec::new() },
         }

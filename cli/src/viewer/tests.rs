@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use glam::Vec2;
 use gui::egui::{self, Event, Key, Modifiers, PointerButton, Pos2, RawInput, Rect};
-use relight::{GameFiles, sample};
+use relight::GameFiles;
+use relight::sample::Sample;
 use renderer_vk::api::Picture;
 use renderer_vk::{Renderer, RendererOptions, Settings};
 
@@ -24,7 +25,7 @@ const PATIENCE: usize = 2000;
 
 /// Writes the sample as a game folder.
 fn write_sample(folder: &Path) {
-    let files = sample::files().unwrap();
+    let files = Sample::Hall.files().unwrap();
     for (dir, extension) in [("maps", ".bsp"), ("scripts", ".shader"), ("sample", ".tga")] {
         std::fs::create_dir_all(folder.join(dir)).unwrap();
         for name in files.list(dir, extension) {
@@ -45,7 +46,7 @@ fn viewer(folder: &Path, map: &str) -> Option<Viewer> {
         source: Source {
             chosen: ChosenMap {
                 map: Some(map.to_owned()),
-                sample: false,
+                sample: None,
                 game: Game {
                     paths: vec![folder.to_owned()],
                 },
@@ -154,7 +155,7 @@ fn difference(a: &Picture, b: &Picture, from: u32, to: u32) -> f64 {
 fn mouse_and_keys_move_pick_and_split() {
     let folder = tempfile::tempdir().unwrap();
     write_sample(folder.path());
-    let map = folder.path().join(sample::MAP).display().to_string();
+    let map = folder.path().join(Sample::Hall.map()).display().to_string();
     let Some(mut viewer) = viewer(folder.path(), &map) else {
         return;
     };
@@ -291,7 +292,7 @@ fn lights_are_changed_saved_and_reloaded() {
         viewer.message.as_deref() == Some("lights reloaded")
     });
     let camera = viewer.motion.camera.origin;
-    let map = folder.path().join(sample::MAP);
+    let map = folder.path().join(Sample::Hall.map());
     std::fs::write(&map, "no map").unwrap();
     until(&mut viewer, "a damaged map is not reported", |viewer| {
         viewer

@@ -31,7 +31,7 @@ const ROSE: (f32, Vec3) = (700.0, Vec3::new(1.0, 0.45, 0.3));
 const SKY: (f32, Vec3) = (30.0, Vec3::new(0.85, 0.85, 1.0));
 
 /// Adds a lamp: a plate, and parts along and across it for the stored light.
-fn lamp(
+pub(super) fn lamp(
     scene: &mut Scene,
     lamps: &mut Vec<Lamp>,
     (shader, light): (q3bsp::ShaderId, (f32, Vec3)),

@@ -39,12 +39,18 @@ pub(super) struct Lamp {
 /// What the light of a point is computed from.
 pub(super) struct Lighting<'a> {
     lamps: &'a [Lamp],
+    sun: bool,
     occluders: Occluders,
 }
 
 impl<'a> Lighting<'a> {
-    /// `stops`: whether a surface stops light, by its index; glass, liquids, fog and lamps do not.
-    pub fn new(bsp: &Bsp, lamps: &'a [Lamp], stops: impl Fn(usize) -> bool) -> Lighting<'a> {
+    /// `sun`: the sun shines. `stops`: whether a surface stops light, by its index; glass, liquids, fog and lamps do not.
+    pub fn new(
+        bsp: &Bsp,
+        lamps: &'a [Lamp],
+        sun: bool,
+        stops: impl Fn(usize) -> bool,
+    ) -> Lighting<'a> {
         let mut triangles = Vec::new();
         for (index, mesh) in meshes(bsp).into_iter().enumerate() {
             if stops(index) {
@@ -54,6 +60,7 @@ impl<'a> Lighting<'a> {
         let input = triangles.into_iter().map(|t| (t, false, 0));
         Lighting {
             lamps,
+            sun,
             occluders: Occluders::new(input),
         }
     }
@@ -76,7 +83,7 @@ impl<'a> Lighting<'a> {
             }
         }
         let cosine = normal.dot(SUN);
-        if cosine > 0.0 {
+        if self.sun && cosine > 0.0 {
             for offset in SUN_OFFSETS {
                 let direction = SUN + offset;
                 let passed = windows::tint(from, direction);
@@ -91,7 +98,7 @@ impl<'a> Lighting<'a> {
     }
 
     /// The points of the light grid; those in walls stay dark.
-    pub fn grid(&self, bsp: &Bsp) -> Vec<GridPoint> {
+    fn grid(&self, bsp: &Bsp) -> Vec<GridPoint> {
         let Some(layout) = bsp.light_grid() else {
             return bsp.light_grid.clone();
         };
@@ -134,8 +141,29 @@ impl<'a> Lighting<'a> {
         }
     }
 
+    /// Stores the light in the map: pages of lightmaps for `places`, the light grid, and colours of the vertices of
+    /// surfaces without a page.
+    pub fn store(&self, bsp: &mut Bsp, places: &[Place]) {
+        let pages = self.pages(bsp, places);
+        bsp.light_grid = self.grid(bsp);
+        bsp.lightmaps = (pages.into_iter())
+            .map(|page| q3bsp::Lightmap(page.into_flattened().into()))
+            .collect();
+        for surface in &bsp.surfaces {
+            if surface.kind != SurfaceKind::TriangleSoup {
+                continue;
+            }
+            let (first, count) = (surface.first_vert.max(0), surface.num_verts.max(0));
+            let vertices = bsp.vertices.iter_mut().skip(first as usize);
+            for vertex in vertices.take(count as usize) {
+                let [r, g, b] = bytes(self.at(vertex.position, vertex.normal));
+                vertex.color = [r, g, b, 255];
+            }
+        }
+    }
+
     /// The pages of the lightmaps.
-    pub fn pages(&self, bsp: &Bsp, places: &[Place]) -> Vec<Vec<[u8; 3]>> {
+    fn pages(&self, bsp: &Bsp, places: &[Place]) -> Vec<Vec<[u8; 3]>> {
         let meshes = meshes(bsp);
         let rectangles = parallel::map(places, |_, place| {
             let mesh = meshes.get(place.surface).map_or(&[][..], Vec::as_slice);

@@ -1,12 +1,13 @@
-//! A small game made in memory: one map, its materials and its textures, all computed here. It shows what the
-//! renderer does without any game's data: a vaulted hall in the evening with coloured windows, a mirror, a pool that is
-//! lit from below, a ball of crystal, lanterns that flicker, fog and sky.
+//! Small games made in memory: maps, their materials and their textures, all computed here. They show what the renderer
+//! does without any game's data: a vaulted hall in the evening with coloured windows, a mirror, a pool that is lit from
+//! below, a ball of crystal, lanterns that flicker, fog and sky; and a room of surfaces that reflect in different ways.
 
 mod furniture;
 mod hall;
 mod light;
 mod plan;
 mod scene;
+mod surfaces;
 #[cfg(test)]
 mod tests;
 mod textures;
@@ -20,11 +21,68 @@ use crate::files::{FileError, MemoryFiles};
 use light::Lighting;
 use scene::Scene;
 
-/// Game path of the sample's map.
-pub const MAP: &str = "maps/sample.bsp";
+/// A built-in sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sample {
+    /// The hall.
+    #[default]
+    Hall,
+    /// The room of surfaces.
+    Surfaces,
+}
 
-/// Game path of its materials.
-const SCRIPT: &str = "scripts/sample.shader";
+impl Sample {
+    /// All samples.
+    pub const ALL: [Sample; 2] = [Sample::Hall, Sample::Surfaces];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Sample::Hall => "hall",
+            Sample::Surfaces => "surfaces",
+        }
+    }
+
+    /// Game path of its map.
+    pub fn map(self) -> &'static str {
+        match self {
+            Sample::Hall => "maps/sample.bsp",
+            Sample::Surfaces => surfaces::MAP,
+        }
+    }
+
+    /// Paths and contents of its files: scripts, textures, map.
+    pub fn entries(self) -> Vec<(String, Vec<u8>)> {
+        let (texts, images, bsp) = match self {
+            Sample::Hall => (&TEXTS[..], textures::images(), build_map()),
+            Sample::Surfaces => (
+                &surfaces::TEXTS[..],
+                surfaces::images(),
+                surfaces::build_map(),
+            ),
+        };
+        let texts = texts
+            .iter()
+            .map(|(path, text)| (path.to_string(), text.as_bytes().to_vec()));
+        let map = (self.map().to_owned(), bsp.write());
+        texts.chain(images).chain([map]).collect()
+    }
+
+    /// The sample as game files.
+    ///
+    /// # Errors
+    /// None in practice: all paths are well-formed.
+    pub fn files(self) -> Result<MemoryFiles, FileError> {
+        let mut files = MemoryFiles::new();
+        for (path, bytes) in self.entries() {
+            files.insert(&path, bytes)?;
+        }
+        Ok(files)
+    }
+}
+
+/// Script of the hall.
+const TEXTS: [(&str, &str); 1] = [("scripts/sample.shader", include_str!("sample.shader"))];
 
 /// Distance of the points of the light grid.
 const GRID: Vec3 = Vec3::new(64.0, 64.0, 96.0);
@@ -167,26 +225,9 @@ fn build_map() -> Bsp {
     let stops: Vec<bool> = (bsp.surfaces.iter())
         .map(|surface| !clear.contains(&surface.shader))
         .collect();
-    let lighting = Lighting::new(&bsp, &lamps, |surface| stops.get(surface) == Some(&true));
-    let pages = lighting.pages(&bsp, &places);
-    let grid = lighting.grid(&bsp);
-    bsp.lightmaps = (pages.into_iter())
-        .map(|page| q3bsp::Lightmap(page.into_flattened().into()))
-        .collect();
-    bsp.light_grid = grid;
+    let lighting = Lighting::new(&bsp, &lamps, true, |surface| {
+        stops.get(surface) == Some(&true)
+    });
+    lighting.store(&mut bsp, &places);
     bsp
-}
-
-/// The sample as game files: script, textures, map.
-///
-/// # Errors
-/// None in practice: all paths are well-formed.
-pub fn files() -> Result<MemoryFiles, FileError> {
-    let mut files = MemoryFiles::new();
-    files.insert(SCRIPT, include_str!("sample.shader"))?;
-    for (path, bytes) in textures::images() {
-        files.insert(&path, bytes)?;
-    }
-    files.insert(MAP, build_map().write())?;
-    Ok(files)
 }

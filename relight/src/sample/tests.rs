@@ -7,93 +7,102 @@ use q3bsp::{Bsp, SurfaceKind, content_flags};
 
 use super::*;
 use crate::files::GameFiles;
+use crate::materials::by_hand::MaterialsByHand;
+use crate::materials::finish::Finish;
 use crate::materials::light::{self, SurfaceClass};
 use crate::occluders::Occluders;
 use crate::{Materials, Options, RelitWorld, image, viewpoints};
 
-fn bsp_of(files: &MemoryFiles) -> Bsp {
-    Bsp::parse(&files.read(MAP).unwrap().unwrap()).unwrap()
+fn bsp_of(sample: Sample) -> Bsp {
+    let files = sample.files().unwrap();
+    Bsp::parse(&files.read(sample.map()).unwrap().unwrap()).unwrap()
 }
 
-fn world_of(files: &MemoryFiles) -> RelitWorld {
-    let (materials, diagnostics) = Materials::load(files);
+fn world_of(sample: Sample) -> RelitWorld {
+    let files = sample.files().unwrap();
+    let (materials, diagnostics) = Materials::load(&files);
     assert!(diagnostics.is_empty(), "{diagnostics:?}");
     let options = Options {
         calibrate: None,
         ..Options::default()
     };
-    RelitWorld::load(files, &materials, MAP, options).unwrap()
+    RelitWorld::load(&files, &materials, sample.map(), options).unwrap()
 }
 
 #[test]
 fn the_map_is_valid_and_its_faces_look_inwards() {
-    let files = files().unwrap();
-    let bsp = bsp_of(&files);
-    assert_eq!(bsp.warnings, []);
-    assert_eq!(bsp.fogs.len(), 1);
-    // whichever way one looks, there is a surface, and one sees its front
-    let occluders = Occluders::of_world(&world_of(&files));
-    let entities = bsp.entities();
-    let views = viewpoints::intermission(&entities)
-        .into_iter()
-        .chain(viewpoints::spawn_views(&entities));
-    for eye in views
-        .map(|view| view.origin)
-        .chain([Vec3::new(0.0, 0.0, 200.0)])
-    {
-        for at in 0..2000 {
-            let (z, turn) = (at as f32 / 1000.0 - 0.9995, at as f32 * 2.399_963);
-            let direction = (Vec2::from_angle(turn) * (1.0 - z * z).sqrt()).extend(z);
-            let hit = occluders.nearest(eye, direction, 4096.0);
-            let hit = hit.unwrap_or_else(|| panic!("nothing from {eye} towards {direction}"));
-            let place = eye + direction * hit.t;
-            assert!(hit.front, "a back at {place} from {eye}");
+    for (sample, fogs) in [(Sample::Hall, 1), (Sample::Surfaces, 0)] {
+        let bsp = bsp_of(sample);
+        assert_eq!(bsp.warnings, []);
+        assert_eq!(bsp.fogs.len(), fogs);
+        // whichever way one looks, there is a surface, and one sees its front
+        let occluders = Occluders::of_world(&world_of(sample));
+        let entities = bsp.entities();
+        let views = viewpoints::intermission(&entities)
+            .into_iter()
+            .chain(viewpoints::spawn_views(&entities));
+        for eye in views
+            .map(|view| view.origin)
+            .chain([Vec3::new(0.0, 0.0, 196.0)])
+        {
+            for at in 0..2000 {
+                let (z, turn) = (at as f32 / 1000.0 - 0.9995, at as f32 * 2.399_963);
+                let direction = (Vec2::from_angle(turn) * (1.0 - z * z).sqrt()).extend(z);
+                let hit = occluders.nearest(eye, direction, 4096.0);
+                let hit = hit.unwrap_or_else(|| panic!("nothing from {eye} towards {direction}"));
+                let place = eye + direction * hit.t;
+                assert!(hit.front, "a back at {place} from {eye}");
+            }
         }
     }
 }
 
 #[test]
 fn players_stand_in_clusters_on_brushes() {
-    let bsp = bsp_of(&files().unwrap());
-    let solid = |p: Vec3| {
-        bsp.brushes.iter().any(|brush| {
-            let stops = bsp.shader(brush.shader).content_flags & content_flags::SOLID != 0;
-            let inside = |side: &q3bsp::BrushSide| bsp.plane(side.plane).distance(p) <= 0.0;
-            stops && bsp.sides_of(brush).iter().all(inside)
-        })
-    };
-    let mut spawns = 0;
-    for entity in bsp.entities() {
-        if !entity.classname().starts_with("info_player") {
-            continue;
+    let walls = [
+        (Sample::Hall, Vec3::new(-455.0, 0.0, 90.0)),
+        (Sample::Hall, Vec3::new(0.0, 144.0, 60.0)),
+        (Sample::Hall, Vec3::new(60.0, 120.0, -8.0)),
+        (Sample::Surfaces, Vec3::new(290.0, 0.0, 90.0)),
+        (Sample::Surfaces, Vec3::new(0.0, 134.0, 40.0)),
+    ];
+    for sample in Sample::ALL {
+        let bsp = bsp_of(sample);
+        let solid = |p: Vec3| {
+            bsp.brushes.iter().any(|brush| {
+                let stops = bsp.shader(brush.shader).content_flags & content_flags::SOLID != 0;
+                let inside = |side: &q3bsp::BrushSide| bsp.plane(side.plane).distance(p) <= 0.0;
+                stops && bsp.sides_of(brush).iter().all(inside)
+            })
+        };
+        let mut spawns = 0;
+        for entity in bsp.entities() {
+            if !entity.classname().starts_with("info_player") {
+                continue;
+            }
+            let origin = entity.vec3("origin").unwrap();
+            let cluster = bsp.cluster_at(origin);
+            assert!(cluster >= 0, "{origin}");
+            assert!(!solid(origin), "{origin}");
+            if entity.classname() == "info_player_deathmatch" {
+                spawns += 1;
+                let below = (0..64).any(|down| solid(origin - Vec3::Z * down as f32));
+                assert!(below, "{origin}: nothing to stand on");
+            }
+            // everyone sees everything: the hall has no closed rooms
+            let clusters = bsp.num_clusters() as i32;
+            assert!((0..clusters).all(|other| bsp.cluster_sees(cluster, other)));
         }
-        let origin = entity.vec3("origin").unwrap();
-        let cluster = bsp.cluster_at(origin);
-        assert!(cluster >= 0, "{origin}");
-        assert!(!solid(origin), "{origin}");
-        if entity.classname() == "info_player_deathmatch" {
-            spawns += 1;
-            let below = (0..64).any(|down| solid(origin - Vec3::Z * down as f32));
-            assert!(below, "{origin}: nothing to stand on");
+        assert!(spawns >= 4);
+        for (_, wall) in walls.iter().filter(|(of, _)| *of == sample) {
+            assert!(solid(*wall), "{wall}");
         }
-        // everyone sees everything: the hall has no closed rooms
-        let clusters = bsp.num_clusters() as i32;
-        assert!((0..clusters).all(|other| bsp.cluster_sees(cluster, other)));
-    }
-    assert!(spawns >= 4);
-    for wall in [
-        Vec3::new(-455.0, 0.0, 90.0),
-        Vec3::new(0.0, 144.0, 60.0),
-        Vec3::new(60.0, 120.0, -8.0),
-    ] {
-        assert!(solid(wall), "{wall}");
     }
 }
 
 #[test]
 fn every_promised_thing_is_there() {
-    let files = files().unwrap();
-    let world = world_of(&files);
+    let world = world_of(Sample::Hall);
     assert_eq!(world.warnings, Vec::<String>::new());
     let patches = world
         .bsp
@@ -153,7 +162,7 @@ fn every_promised_thing_is_there() {
 
 #[test]
 fn lamps_have_colours_and_change_slowly() {
-    let world = world_of(&files().unwrap());
+    let world = world_of(Sample::Hall);
     let mut colors = BTreeSet::new();
     let mut animated = 0;
     for material in world.materials.iter().filter(|m| !m.is_sky()) {
@@ -174,7 +183,7 @@ fn lamps_have_colours_and_change_slowly() {
 
 #[test]
 fn images_have_their_size_and_detail() {
-    let files = files().unwrap();
+    let files = Sample::Hall.files().unwrap();
     for (name, _) in textures::images() {
         let (picture, _) = image::load(&files, &name).unwrap().unwrap();
         let side = picture.width as usize;
@@ -195,16 +204,50 @@ fn images_have_their_size_and_detail() {
 
 #[test]
 fn the_same_game_every_time() {
-    let (one, two) = (files().unwrap(), files().unwrap());
-    assert_eq!(one.read(MAP).unwrap(), two.read(MAP).unwrap());
-    for (name, _) in textures::images() {
-        assert_eq!(one.read(&name).unwrap(), two.read(&name).unwrap(), "{name}");
+    for sample in Sample::ALL {
+        assert!(sample.entries() == sample.entries());
     }
 }
 
 #[test]
+fn surfaces_are_stated_by_files_and_images() {
+    let files = Sample::Surfaces.files().unwrap();
+    let (materials, diagnostics) = Materials::load(&files);
+    assert!(diagnostics.is_empty(), "{diagnostics:?}");
+    let (stated, faults) = MaterialsByHand::load(&files, Sample::Surfaces.map());
+    assert_eq!(faults, Vec::<String>::new());
+    let world = world_of(Sample::Surfaces);
+    let names: Vec<&str> = world.materials.iter().map(|m| m.name.as_str()).collect();
+    assert_eq!(
+        stated.unmatched(Sample::Surfaces.map(), &names),
+        Vec::<String>::new()
+    );
+    let finish = |name: &str| {
+        let material = world.materials.iter().find(|m| m.name == name).unwrap();
+        let exists = |image: &str| image::find(&files, image).is_some();
+        let of_pack = materials.of_pack(name, &material.resolved.shader, &exists);
+        stated.finish(name, &of_pack)
+    };
+    let brick = finish("surfaces/brick");
+    assert!(brick.normals.is_some() && brick.surface.is_some_and(|map| map.is_specular()));
+    let floor = finish("surfaces/floor");
+    assert!(floor.normals.is_some() && floor.surface.is_some());
+    assert_eq!(finish("surfaces/plaster"), Finish::default());
+    let ball = finish("surfaces/metal3");
+    assert_eq!((ball.roughness, ball.metal), (Some(0.5), Some(1.0)));
+    assert!(finish("surfaces/frosted").glass.is_some());
+    // most of it is the vertices of the balls
+    let bytes: usize = Sample::Surfaces
+        .entries()
+        .iter()
+        .map(|(_, bytes)| bytes.len())
+        .sum();
+    assert!(bytes < 2_500_000, "{bytes}");
+}
+
+#[test]
 fn stored_light_has_colours_and_shadows() {
-    let bsp = bsp_of(&files().unwrap());
+    let bsp = bsp_of(Sample::Hall);
     assert!(
         (1..=4).contains(&bsp.lightmaps.len()),
         "{}",

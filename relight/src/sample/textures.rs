@@ -11,7 +11,7 @@ pub(super) const LARGE: usize = 256;
 pub(super) const SMALL: usize = 128;
 
 /// A colour of a texel, 0 to 1, display-encoded, and its alpha.
-type Texel = (Vec3, f32);
+pub(super) type Texel = (Vec3, f32);
 
 /// Repeatable number in 0..1 for the cell (x, y).
 pub(super) fn grain(x: i32, y: i32) -> f32 {
@@ -37,7 +37,7 @@ fn noise(at: Vec2, cells: i32) -> f32 {
 }
 
 /// Sum of `octaves` of [`noise`], each of half the size and weight; about 0..1.
-fn fractal(at: Vec2, cells: i32, octaves: i32) -> f32 {
+pub(super) fn fractal(at: Vec2, cells: i32, octaves: i32) -> f32 {
     let parts = (0..octaves).map(|octave| {
         let weight = 0.5f32.powi(octave);
         (weight, weight * noise(at, cells << octave))
@@ -302,7 +302,7 @@ pub(super) fn grate_is_solid(st: Vec2) -> bool {
 }
 
 /// The texel at a place of a texture.
-type Recipe = Box<dyn Fn(Vec2) -> Texel + Sync>;
+pub(super) type Recipe = Box<dyn Fn(Vec2) -> Texel + Sync>;
 
 /// The images: names, sides, and what shows where.
 fn recipes() -> Vec<(&'static str, usize, Recipe)> {
@@ -343,7 +343,16 @@ fn recipes() -> Vec<(&'static str, usize, Recipe)> {
 
 /// The images by path.
 pub(super) fn images() -> Vec<(String, Vec<u8>)> {
-    parallel::map(&recipes(), |_, (name, side, texel)| {
-        (format!("sample/{name}.tga"), tga(*side, texel))
+    images_of("sample", &recipes())
+}
+
+/// Images by path, from their names, sides and texels.
+pub(super) fn images_of<N: AsRef<str> + Sync>(
+    folder: &str,
+    recipes: &[(N, usize, Recipe)],
+) -> Vec<(String, Vec<u8>)> {
+    parallel::map(recipes, |_, (name, side, texel)| {
+        let name = name.as_ref();
+        (format!("{folder}/{name}.tga"), tga(*side, texel))
     })
 }

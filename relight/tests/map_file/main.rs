@@ -296,9 +296,9 @@ fn triangle(corners: [DrawVert; 3], list: &[Made<'_>], origin: DVec3, out: &mut 
 
 #[test]
 fn the_sample_map_comes_back() {
-    let files: MemoryFiles = relight::sample::files().unwrap();
+    let files: MemoryFiles = relight::sample::Sample::Hall.files().unwrap();
     for brushes in [Brushes::Usual, Brushes::Valve, Brushes::Classic] {
-        let (text, world) = write(&files, relight::sample::MAP, brushes);
+        let (text, world) = write(&files, relight::sample::Sample::Hall.map(), brushes);
         let found = agreement(&text, &world, &files);
         println!("{found:?}");
         assert!(found.open == 0 && found.brushes > 0 && found.patches > 0);

@@ -1,9 +1,10 @@
 //! Maps to JSON and back.
 
 use super::*;
+use crate::SearchPath;
 use crate::export::uncalibrated as world;
 use crate::files::GameFiles;
-use crate::{SearchPath, sample};
+use crate::sample::Sample;
 use proptest::prelude::*;
 use q3bsp::builder::MapBuilder;
 use q3bsp::{DrawVert, Format, GridLayers, GridPoint, SurfaceLayers, VertexLayers};
@@ -113,8 +114,8 @@ fn what_is_no_such_document_is_refused_with_its_place() {
 
 #[test]
 fn the_sample_and_a_shipped_map_survive() {
-    let files = sample::files().unwrap();
-    let bytes = files.read(sample::MAP).unwrap().unwrap();
+    let files = Sample::Hall.files().unwrap();
+    let bytes = files.read(Sample::Hall.map()).unwrap().unwrap();
     let bsp = Bsp::parse(&bytes).unwrap();
     let read = read_back(bsp).unwrap();
     assert!(read.write() == bytes);

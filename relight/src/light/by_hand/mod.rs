@@ -343,7 +343,7 @@ mod tests {
     use super::*;
     use crate::Options;
     use crate::materials::Materials;
-    use crate::sample;
+    use crate::sample::Sample;
 
     const TEXT: &str = "# lamps of the hall
 point 8 16 24  300  1 0.5 0   6   // above the door
@@ -407,12 +407,12 @@ spot 1 2 3 100 1 1 1 1 2 3 30
             calibrate: None,
             ..Options::default()
         };
-        RelitWorld::load(files, &materials, sample::MAP, options).unwrap()
+        RelitWorld::load(files, &materials, Sample::Hall.map(), options).unwrap()
     }
 
     #[test]
     fn a_file_beside_the_map_changes_its_lights() {
-        let mut files = sample::files().unwrap();
+        let mut files = Sample::Hall.files().unwrap();
         let plain = load(&files);
         assert!(plain.lights.len() > 1 && plain.warnings.is_empty());
         let lamp = plain.surfaces[plain.lights[0].surface as usize].material;
@@ -441,7 +441,7 @@ spot 1 2 3 100 1 1 1 1 2 3 30
 
     #[test]
     fn files_of_materials_state_light_that_files_of_lights_override() {
-        let mut files = sample::files().unwrap();
+        let mut files = Sample::Hall.files().unwrap();
         let plain = load(&files);
         let lamp = plain.surfaces[plain.lights[0].surface as usize].material;
         let name = plain.materials[lamp as usize].name.clone();
