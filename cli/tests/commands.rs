@@ -36,6 +36,7 @@ fn help_lists_the_commands_of_users_and_those_of_the_lab_apart() {
         "material",
         "render",
         "report",
+        "sample",
         "view",
         "help",
     ];
@@ -160,4 +161,27 @@ fn what_was_never_there_is_refused_by_its_name() {
         let text = String::from_utf8(refused.stderr).unwrap();
         assert!(text.contains(printed) && !text.contains("is now"), "{text}");
     }
+}
+
+#[test]
+fn samples_are_written_as_packs_and_never_over_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let pack = folder.path().join("surfaces.pk3");
+    let path = pack.to_str().unwrap();
+    let write = |name: &str, path: &str| output(RELIGHT, &["sample", name, "-o", path]);
+    assert!(write("surfaces", path).status.success());
+    let info = output(RELIGHT, &["info", path]);
+    assert!(info.status.success(), "{info:?}");
+    let bytes = std::fs::read(&pack).unwrap();
+    assert!(bytes.len() < 1_000_000);
+    for (name, path) in [
+        ("surfaces", path),
+        ("surfaces", "x.zip"),
+        ("cellar", "y.pk3"),
+    ] {
+        let refused = write(name, path);
+        assert!(!refused.status.success(), "{name} {path}");
+        assert!(!refused.stderr.is_empty());
+    }
+    assert_eq!(std::fs::read(&pack).unwrap(), bytes);
 }

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use relight::{GameFiles, sample, viewpoints};
+use relight::sample::Sample;
+use relight::{GameFiles, viewpoints};
 use renderer_vk::api::RefDef;
 use renderer_vk::{Renderer, Settings};
 
@@ -12,9 +13,9 @@ pub fn load_sample(
     settings: &Settings,
     (width, height): (u32, u32),
 ) -> RefDef {
-    let files: Arc<dyn GameFiles> = Arc::new(sample::files().unwrap());
+    let files: Arc<dyn GameFiles> = Arc::new(Sample::Hall.files().unwrap());
     renderer.begin_registration(files, settings).unwrap();
-    renderer.load_world(sample::MAP).unwrap();
+    renderer.load_world(Sample::Hall.map()).unwrap();
     renderer.end_registration();
     let entities = renderer.world().unwrap().relit.bsp.entities();
     let view = viewpoints::spawn_views(&entities).next().unwrap();
