@@ -98,12 +98,12 @@ bool shows_face(SurfacePoint p, vec3 direction) {
 }
 
 // Bounds the light of lamps and suns that paths meet by chance, in live frames: it comes in few, bright samples, which a
-// denoiser takes for light. Four times display white.
+// denoiser takes for light. Four times display white, of what the pixel shows.
 const float MOST_LIVE_LIGHT = 4.0;
 
-vec3 bounded_light(vec3 light) {
+vec3 bounded_light(vec3 light, float most) {
     if ((VIEW.flags & VIEW_ACCUMULATE) != 0) return light;
-    return light * min(MOST_LIVE_LIGHT * exp2(-VIEW.exposure.base) / max(max_component(light), 1.0e-20), 1.0);
+    return light * min(most * exp2(-VIEW.exposure.base) / max(max_component(light), 1.0e-20), 1.0);
 }
 
 // Radiance of a surface as a light of the lists, as far as the ray counts it. `away`: its distance.
@@ -205,8 +205,8 @@ bool rough_direction(inout PathVertex v, inout vec3 throughput) {
 }
 
 // Shades the hit of a bounce ray: adds emission to `sum`, and moves the vertex to the hit. `chain`: how the ray started.
-// Returns whether the path goes on or takes a light sample at the vertex.
-bool bounce_shade(Hit hit, vec3 origin, uint chain, inout vec3 throughput, inout vec3 sum, out PathVertex v) {
+// `most`: bound of what lamps and suns add. Returns whether the path goes on or takes a light sample at the vertex.
+bool bounce_shade(Hit hit, vec3 origin, uint chain, float most, inout vec3 throughput, inout vec3 sum, out PathVertex v) {
     SurfacePoint p = surface_point(hit);
     vec3 direction = safe_normalize(p.position - origin, -p.face_normal);
     float t = dot(p.position - origin, direction);
@@ -220,10 +220,10 @@ bool bounce_shade(Hit hit, vec3 origin, uint chain, inout vec3 throughput, inout
     // passes that sample the lists have counted their lights
     Material material = material_of(p.triangle.material);
     bool in_lists = (material.flags & MATERIAL_EMITTER) != 0, counts = (chain & CHAIN_BITS) >= CHAIN_UNSAMPLED;
-    if (in_lists && counts) sum += bounded_light(throughput * listed_radiance(p, direction, t, chain));
+    if (in_lists && counts) sum += bounded_light(throughput * listed_radiance(p, direction, t, chain), most);
     if (p.kind == KIND_SKY) {
         if (!in_lists) sum += throughput * sky_radiance(p, direction, BOUNCE_SPREAD, false, vec4(0.0));
-        if (counts) sum += bounded_light(throughput * sun_radiance(direction, chain));
+        if (counts) sum += bounded_light(throughput * sun_radiance(direction, chain), most);
         return false;
     }
     Footprint seen = round_footprint(t * BOUNCE_SPREAD);

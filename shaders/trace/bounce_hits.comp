@@ -4,6 +4,9 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
+// Live, a specular path goes on for sure from this inverse specular albedo on.
+const float SURELY_SHOWN = 4.0;
+
 float surface_distance(Hit hit, vec3 origin) {
     SurfacePoint p = surface_point(hit);
     return p.kind == KIND_SKY ? FAR : distance(p.position, origin);
@@ -33,7 +36,8 @@ void main() {
             gloss.hit_distance = hit.geometry == NO_HIT ? 0.0 : surface_distance(hit, origin);
             gloss_write(pixel, gloss);
         }
-        onward = hit.geometry != NO_HIT && bounce_shade(hit, origin, chain, throughput, b.found, v);
+        float most = is_specular() && push.number == 0 ? most_specular_light(gloss) : MOST_LIVE_LIGHT;
+        onward = hit.geometry != NO_HIT && bounce_shade(hit, origin, chain, most, throughput, b.found, v);
         if (onward) {
             if (v.chain == CHAIN_NONE) {
                 b.light = vertex_light(v);
@@ -44,6 +48,12 @@ void main() {
                 onward = rough_direction(v, throughput);
             }
             b.origin = vertex_origin(v);
+            if (is_specular() && (VIEW.flags & VIEW_ACCUMULATE) == 0) {
+                // Russian roulette by what the surface shows of the light
+                float chance = min(SURELY_SHOWN * max_component(gloss.lobe_albedo), 1.0);
+                onward = onward && rng_next() < chance;
+                throughput /= max(chance, 1.0e-3);
+            }
         }
     }
     bounce_light_write(cell, b, random);

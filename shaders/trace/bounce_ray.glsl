@@ -42,6 +42,9 @@ bool gathers(LightTask task, out GlossPixel gloss) {
     return is_glossy(gloss.gloss);
 }
 
+// Bound of the light of a specular path in live frames: relative to the specular albedo.
+float most_specular_light(GlossPixel gloss) { return MOST_LIVE_LIGHT / max(max_component(gloss.lobe_albedo), 1.0e-3); }
+
 // Makes the first vertex of a specular path from a pixel's surface; its throughput is relative to the specular albedo.
 PathVertex rough_vertex(LightTask task, GlossPixel gloss, out vec3 throughput) {
     PathVertex v = first_vertex(task);

@@ -101,11 +101,10 @@ struct Interface {
     float frost; // width of the distribution of its microfacets; 0: smooth
 };
 
-// A microfacet's normal of frosted glass. While frames accumulate, every frame samples another one; live, a pixel keeps
-// its own, because a surface that jumps between frames has no history.
-vec3 frosted_normal(float alpha, vec3 normal, vec3 to_viewer) {
-    vec2 u = (VIEW.flags & VIEW_ACCUMULATE) != 0 ? rng_next2() : vec2(unit_float(rng_seed()), unit_float(rng_seed()));
-    return sample_facet(alpha, normal, to_viewer, u);
+// Whether glass is frosted: while frames accumulate. Live frames show it clear, because pixels that see another surface each
+// frame, or each another one than its neighbour, have neither history nor neighbours to filter with.
+bool is_frosted(Material material) {
+    return HAS_GLOSS != 0 && (material.flags & MATERIAL_ROUGH) != 0 && (VIEW.flags & VIEW_ACCUMULATE) != 0;
 }
 
 Interface interface_at(Path path, SurfacePoint p, Material material, float width) {
@@ -124,10 +123,10 @@ Interface interface_at(Path path, SurfacePoint p, Material material, float width
     }
     i.bend = dielectric.ripple > 0.0 ? BENT_BY_RIPPLES : BENT_BY_SHAPE;
     i.frost = 0.0;
-    if (HAS_GLOSS != 0 && (material.flags & MATERIAL_ROUGH) != 0) {
+    if (is_frosted(material)) {
         float rough = max(material.specular.roughness, LEAST_ROUGHNESS);
         i.frost = rough * rough;
-        i.normal = frosted_normal(i.frost, i.normal, -path.direction);
+        i.normal = sample_facet(i.frost, i.normal, -path.direction, rng_next2());
         cosine = max(-dot(i.normal, path.direction), 0.0);
         i.bend = BENT_BY_RIPPLES;
     }
@@ -153,7 +152,7 @@ bool pass_interface(inout Path path, SurfacePoint p, Interface i, SeenLayer seen
 // Continues the path behind a frosted pane: it enters by the smooth face and leaves by the rough one.
 void scatter_path(inout Path path, SurfacePoint p, Interface i, float t) {
     vec3 inside = refract(path.direction, i.face, 1.0 / i.eta);
-    vec3 scattered = refract(inside, frosted_normal(i.frost, i.face, -inside), i.eta);
+    vec3 scattered = refract(inside, sample_facet(i.frost, i.face, -inside, rng_next2()), i.eta);
     // total reflection, or a direction back into the pane: it is scattered on until it leaves; here it passes straight
     if (dot(scattered, i.face) >= 0.0) scattered = path.direction;
     path.bent = max(path.bent, i.bend);

@@ -20,6 +20,8 @@ pub struct OfScript {
     pub dielectric: Dielectric,
 }
 
+/// Reflectance at normal incidence that materials other than metal and gems stay below.
+const LITTLE: f32 = 0.2;
 /// Least part of blue over red and green in the mean of a normal map: its normals mostly point away from the surface.
 const LEAST_BLUE: f32 = 1.1;
 
@@ -48,6 +50,16 @@ impl Materials {
     pub fn has_gloss(&self) -> bool {
         let gloss = c::MATERIAL_ROUGH | c::MATERIAL_NORMALS;
         self.list.iter().any(|material| material.flags & gloss != 0)
+    }
+
+    /// Whether a rough material reflects more than [`LITTLE`] at normal incidence.
+    pub fn has_metal(&self) -> bool {
+        let shines = |material: &Material| {
+            let specular = &material.specular;
+            let most = specular.metal.max(specular.reflectance.max_element());
+            material.flags & c::MATERIAL_ROUGH != 0 && most > LITTLE
+        };
+        self.list.iter().any(shines)
     }
 
     /// Applies the files to a material. Returns what is wrong with its images.

@@ -47,17 +47,24 @@ const AHEAD: [Pass; 33] = [
 /// Passes that only maps with fog run.
 const FOG_AHEAD: [Pass; 2] = [Pass::FogLight, Pass::FogFilter];
 
-/// Whether frames with these settings run a pass of [`AHEAD`].
-fn is_chosen(pass: Pass, settings: &Settings) -> bool {
+/// Whether frames with these settings run a pass of [`AHEAD`] on a map.
+fn is_chosen(pass: Pass, settings: &Settings, needs: MapNeeds) -> bool {
+    let gloss = needs.gloss && settings.rt_specular;
     match pass {
         Pass::SampleLights | Pass::SampledDirect | Pass::Suns => samples_one_light(settings),
         Pass::Direct => !samples_one_light(settings),
-        Pass::BounceShade => settings.rt_bounces > 1,
-        Pass::MirrorLight | Pass::BounceRays | Pass::BounceShadeLast | Pass::BounceLight => {
-            settings.rt_bounces > 0
+        Pass::BounceShade => {
+            settings.rt_bounces > 1
+                || gloss && indirect::specular_bounces(settings, needs.metal) > 1
         }
+        Pass::MirrorLight | Pass::BounceRays | Pass::BounceShadeLast | Pass::BounceLight => {
+            settings.rt_bounces > 0 || gloss
+        }
+        Pass::SpecularLight => gloss,
         Pass::BounceUpsample => indirect::is_subsampled(settings, false),
-        Pass::SpecularTemporal | Pass::SpecularFilter => indirect::is_subsampled(settings, true),
+        Pass::SpecularTemporal | Pass::SpecularFilter => {
+            gloss && indirect::is_subsampled(settings, true)
+        }
         Pass::Temporal
         | Pass::WaveletFirst
         | Pass::WaveletSecond
@@ -84,6 +91,8 @@ pub struct MapNeeds {
     pub mirrors: bool,
     /// Materials are rough or have normal maps.
     pub gloss: bool,
+    /// A rough material reflects more than most that are no metal.
+    pub metal: bool,
 }
 
 /// The states of a pass's switches that occur, one bit for each switch.
@@ -115,16 +124,10 @@ fn states(pass: Pass, settings: &Settings, needs: MapNeeds) -> Vec<usize> {
 /// The driver refuses a pipeline.
 pub fn compile_ahead(passes: &PassSet, settings: &Settings, needs: MapNeeds) -> Result<(), Error> {
     let fog: &[Pass] = if needs.fog { &FOG_AHEAD } else { &[] };
-    let is_needed = |pass: &Pass| match pass {
-        Pass::MirrorLight => needs.mirrors,
-        Pass::SpecularLight | Pass::SpecularTemporal | Pass::SpecularFilter => {
-            needs.gloss && settings.rt_specular
-        }
-        _ => true,
-    };
+    let is_needed = |pass: &Pass| *pass != Pass::MirrorLight || needs.mirrors;
     let chosen = AHEAD
         .iter()
-        .filter(|&&pass| is_chosen(pass, settings) && is_needed(&pass));
+        .filter(|&&pass| is_chosen(pass, settings, needs) && is_needed(&pass));
     passes.compile_missing(chosen.chain(fog).flat_map(|&pass| {
         let states = states(pass, settings, needs);
         states.into_iter().map(move |state| (pass, state))
@@ -144,7 +147,7 @@ mod tests {
             .expect("a preset")
             .put(&mut settings)
             .expect("its values");
-        passes.map(|pass| AHEAD.contains(&pass) && is_chosen(pass, &settings))
+        passes.map(|pass| AHEAD.contains(&pass) && is_chosen(pass, &settings, MapNeeds::default()))
     }
 
     #[test]

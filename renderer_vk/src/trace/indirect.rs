@@ -25,6 +25,18 @@ pub fn is_subsampled(settings: &Settings, gloss: bool) -> bool {
     denoise::in_use(settings) != DenoiserChoice::None && (settings.rt_bounces > 0 || gloss)
 }
 
+/// Bounces of a path that starts by a specular lobe: one more than `rt_bounces`, as for a path behind a mirror, so that the
+/// surface that its first ray hits has all bounces of a visible one. Live frames without rough `metal` save it: other
+/// surfaces reflect little.
+pub fn specular_bounces(settings: &Settings, metal: bool) -> u32 {
+    let bounces = settings.rt_bounces.min(MOST_BOUNCES);
+    if settings.rt_accumulate || metal {
+        bounces + 1
+    } else {
+        bounces.max(1)
+    }
+}
+
 /// Records the passes that gather bounced light, by `samples` paths for each pixel that gathers. Where all pixels
 /// gather, the four of a cell take turns, so that the paths of a quarter of the pixels need memory.
 ///

@@ -102,6 +102,10 @@ pub trait MaterialTable {
     fn has_gloss(&self) -> bool {
         false
     }
+    /// Whether a rough material reflects more than most materials that are no metal.
+    fn has_metal(&self) -> bool {
+        false
+    }
     /// Alpha coverage of a triangle by its texture coordinates.
     fn coverage(&self, _material: u32, _corners: [Vec2; 3]) -> Coverage {
         Coverage::Mixed

@@ -70,6 +70,10 @@ impl MaterialTable for Assets {
         self.materials.has_gloss()
     }
 
+    fn has_metal(&self) -> bool {
+        self.materials.has_metal()
+    }
+
     fn sky_sampler(&self) -> u32 {
         self.samplers.index(sampler::CLAMP_MIP)
     }
@@ -258,6 +262,7 @@ impl TraceLook {
             fog: !world.data.relit.bsp.fogs.is_empty(),
             mirrors: self.geometry.mirrors.count(true, None) > 0,
             gloss: assets.materials.has_gloss(),
+            metal: assets.materials.has_metal(),
         }
     }
 

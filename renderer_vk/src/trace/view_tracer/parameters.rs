@@ -8,7 +8,7 @@ use shaders::trace_types::{
 };
 use shaders::types::{SunDisc, constants::NO_TEXTURE};
 
-use super::super::indirect::is_subsampled;
+use super::super::indirect::{self, is_subsampled};
 use super::{DARK_ADAPTATION, LIGHT_ADAPTATION, TracedMap, TracedView, ViewTracer, is_lit};
 use crate::gpu::{Error, Image, Recorder};
 use crate::raster::{FlareTest, WIDE_FORMAT};
@@ -133,7 +133,7 @@ impl ViewTracer {
                 settings.rt_accumulate && geometry.is_some_and(|g| g.mirrors.has_layers()),
             ),
             specular_albedo: self.specular_table.address(),
-            specular_bounces: specular_bounces(settings),
+            specular_bounces: indirect::specular_bounces(settings, materials.has_metal()),
             specular_estimator: self.specular_estimator,
             padding: 0,
             filters: geometry.map_or(0, |g| g.surroundings.filters()),
@@ -273,16 +273,6 @@ fn camera_view(traced: &TracedView<'_>, height: u32) -> CameraView {
         near: camera.near,
         stereo_shift: camera.stereo.slope / camera.tan_x,
         ..camera_frame(traced.scene)
-    }
-}
-
-/// Bounces of a path that starts by a specular lobe. In reference mode one more than `rt_bounces`, as for a path behind a
-/// mirror: the surface that the first ray hits has all bounces of a visible one.
-fn specular_bounces(settings: &Settings) -> u32 {
-    let bounces = settings.rt_bounces.min(MOST_BOUNCES);
-    match settings.rt_accumulate {
-        true => bounces + 1,
-        false => bounces.max(1),
     }
 }
 

@@ -382,6 +382,7 @@ impl Scene {
         let vertices =
             Buffer::with_data(device, "vertices", storage, &self.vertices).expect("buffer");
         let materials = Table {
+            metal: (self.materials.iter()).any(|gpu| gpu.0.specular.metal > 0.0),
             infos: self.materials.iter().map(|m| m.1).collect(),
             buffers,
         };
@@ -435,6 +436,7 @@ pub struct Uploaded {
 
 pub struct Table {
     infos: Vec<MaterialInfo>,
+    metal: bool,
     buffers: [Buffer; 4],
 }
 
@@ -460,6 +462,10 @@ impl MaterialTable for Table {
     fn has_gloss(&self) -> bool {
         let gloss = c::MATERIAL_ROUGH | c::MATERIAL_NORMALS;
         (self.infos.iter()).any(|info| info.flags & gloss != 0)
+    }
+
+    fn has_metal(&self) -> bool {
+        self.metal
     }
 
     fn generation(&self) -> u64 {
