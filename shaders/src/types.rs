@@ -132,7 +132,11 @@ pub struct Specular {
     pub map: u32,
     /// Bindless texture of normals in the tangent space of the texture coordinates. Of `MATERIAL_NORMALS` alone.
     pub normals: u32,
-    /// Bindless sampler of both.
+    /// Bindless texture of what glows, display-encoded. Of `MATERIAL_GLOWS` alone.
+    pub glow: u32,
+    /// Radiance of the white of `glow`.
+    pub glow_radiance: f32,
+    /// Bindless sampler of all.
     pub sampler_index: u32,
     /// Factors of the normals' first two components; the third completes them to unit length.
     pub normal_scale: Vec2,

@@ -295,6 +295,14 @@ vec3 bounded_albedo(Material material, vec3 lit) {
     return material.lit_scale != 1.0 ? min(lit * material.lit_scale, max(lit, 1.0)) : lit;
 }
 
+// What the map of a glowing material shows, linear.
+vec3 glow_map(SurfacePoint p, Material material, Footprint footprint) {
+    if ((material.flags & MATERIAL_GLOWS) == 0 || (VIEW.flags & VIEW_FULLBRIGHT) != 0) return vec3(0.0);
+    Lookups lookups = Lookups(vec2(0.0), 1.0, texture_lod(material.specular.glow, p.texel_scale, footprint.width));
+    vec3 texel = texel_mean(material.specular.glow, material.specular.sampler_index, p.stage.st, lookups).rgb;
+    return decode_display(texel) * material.specular.glow_radiance;
+}
+
 // Gives the sharply mirrored part of the light, which a file of materials states, from the diffuse to the mirrored part.
 void take_mirror(Material material, inout Layer layer) {
     if ((material.flags & MATERIAL_REFLECTS) == 0 || material.specular.mirror == vec3(0.0) || (VIEW.flags & VIEW_FULLBRIGHT) != 0) return;
@@ -309,11 +317,13 @@ Layer evaluate_stages(SurfacePoint p, Footprint footprint) {
     Layer layer = Layer(bounded_albedo(material, linear_part(shown.lit)), linear_part(shown.emission), linear_part(shown.through),
         linear_part(shown.reflected), vec3(0.0));
     take_mirror(material, layer);
+    layer.emission += glow_map(p, material, footprint);
     return layer;
 }
 
 // Emission that an emitter displays: its texture at up to full brightness.
 vec3 shown_glow(Material material) {
+    if ((material.flags & MATERIAL_GLOWS) != 0) return vec3(0.0); // its map shows it
     vec3 radiance = material.light_radiance;
     return radiance / (1.0 + max_component(radiance));
 }

@@ -156,7 +156,8 @@ SeenLayer seen_layer(SurfacePoint p, Material material, Footprint seen, vec3 dir
         shown.through = mix(vec3(1.0), shown.through, clear);
     }
     Layer part = Layer(bounded_albedo(material, linear_part(shown.lit)), vec3(0.0), linear_part(shown.through), linear_part(shown.reflected), vec3(0.0));
-    vec3 own = part.lit * (shown_glow(material) + added_light(p));
+    // a map's glow adds to light, not to displayed values as stages do
+    vec3 own = part.lit * (shown_glow(material) + added_light(p)) + glow_map(p, material, seen) * clear;
     take_mirror(material, part);
     vec3 lobe_albedo;
     Gloss gloss = take_gloss(p, material, seen, direction, part.lit, lobe_albedo);

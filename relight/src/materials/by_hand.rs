@@ -10,6 +10,7 @@
 //! | `mirror NAME R G B` | mirrors this part of the light sharply, beside what its stages show |
 //! | `glass NAME INDEX R G B` | is glass of this refractive index, which lets this part of the light through |
 //! | `emit NAME LIGHT R G B` | shines, as with `q3map_surfacelight LIGHT` and this colour; 0 puts it out |
+//! | `glow NAME IMAGE [RADIANCE]` | shines where this image is bright: white has this radiance, 1 (display white) without a number; as a lamp it has the mean of the image |
 //! | `normals NAME IMAGE [SCALE]` | has a normal map; the factor is that of the normals' parts along the surface |
 //! | `surface NAME IMAGE` | has a map of roughness (green) and metal (blue), which multiply those of other lines |
 //! | `plain NAME` | reflects nothing: forgets the lines before, and shows painted reflections as the game does |
@@ -22,7 +23,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::finish::{Finish, NormalMap, SurfaceMap};
+use super::finish::{Finish, Glow, NormalMap, SurfaceMap};
 use super::mat::Mats;
 use crate::files::GameFiles;
 use crate::hand_written::{LineError, lines, matches, numbers, vector};
@@ -35,6 +36,7 @@ enum Statement {
     Mirror(Vec3),
     Glass(f32, Vec3),
     Emit(f32, Vec3),
+    Glow(String, f32),
     Normals(String, f32),
     Surface(String),
     Plain,
@@ -135,6 +137,13 @@ impl MaterialsByHand {
                 Statement::Mirror(part) => finish.mirror = Some(*part),
                 Statement::Glass(index, part) => finish.glass = Some((*index, *part)),
                 Statement::Emit(value, color) => finish.emission = Some((*value, *color)),
+                Statement::Glow(image, radiance) => {
+                    finish.glow = Some(Glow {
+                        image: image.clone(),
+                        radiance: *radiance,
+                        lights: true,
+                    });
+                }
                 Statement::Normals(image, scale) => {
                     finish.normals = Some(NormalMap {
                         image: image.clone(),
@@ -148,6 +157,7 @@ impl MaterialsByHand {
                     finish = Finish {
                         plain: true,
                         emission: finish.emission,
+                        glow: finish.glow,
                         ..Finish::default()
                     };
                 }
@@ -194,11 +204,19 @@ fn image(word: Option<&&str>) -> Result<String, String> {
         .ok_or_else(|| "the name of an image is missing".to_owned())
 }
 
+/// The number behind an image's name.
+fn one_or(usual: f32, rest: &[&str]) -> Result<f32, String> {
+    match rest.get(1..).unwrap_or_default() {
+        [] => Ok(usual),
+        number => Ok(vector(&numbers(number, 1, 1)?, 0).x),
+    }
+}
+
 fn rule<'a>(words: &[&'a str]) -> Result<(&'a str, Statement), String> {
     let (key, rest) = words.split_first().ok_or("no words")?;
     let key = key.to_ascii_lowercase();
     let known = [
-        "rough", "metal", "mirror", "glass", "emit", "normals", "surface", "plain",
+        "rough", "metal", "mirror", "glass", "emit", "glow", "normals", "surface", "plain",
     ];
     if !known.contains(&key.as_str()) {
         return Err(format!(
@@ -249,13 +267,14 @@ fn rule<'a>(words: &[&'a str]) -> Result<(&'a str, Statement), String> {
                 },
             )
         }
-        "normals" => {
-            let scale = match rest.get(1..).unwrap_or_default() {
-                [] => 1.0,
-                scale => vector(&numbers(scale, 1, 1)?, 0).x,
-            };
-            Statement::Normals(image(rest.first())?, scale)
+        "glow" => {
+            let radiance = one_or(1.0, rest)?;
+            if radiance < 0.0 {
+                return Err("light cannot be below 0".to_owned());
+            }
+            Statement::Glow(image(rest.first())?, radiance)
         }
+        "normals" => Statement::Normals(image(rest.first())?, one_or(1.0, rest)?),
         "surface" => match rest {
             [_] => Statement::Surface(image(rest.first())?),
             _ => return Err("one image belongs here".to_owned()),
@@ -274,7 +293,7 @@ mod tests {
     #[test]
     fn the_last_line_that_matches_counts() {
         let text = "rough textures/* 0.8\nmetal *steel*\nRough *steel_wet 0.1 0.02 // rain\n\
-                    mirror *steel 0.2 0.3 0.4\nplain *rusty*\nemit *lamp 300 2 1 0\n\
+                    mirror *steel 0.2 0.3 0.4\nplain *rusty*\nemit *lamp 300 2 1 0\nglow *lamp textures/lamp_glow 4\n\
                     normals *steel textures/n_n 0.5\nsurface *steel textures/n_rm\nglass *pane 1.5 0.9 1 0.9\n";
         let (file, wrong) = MaterialsByHand::parse(text);
         assert_eq!(wrong, []);
@@ -297,6 +316,11 @@ mod tests {
         assert!(rusty.plain && !rusty.is_rough());
         let lamp = file.finish("textures/lamp", &Finish::default());
         assert_eq!(lamp.emission, Some((300.0, Vec3::new(1.0, 0.5, 0.0))));
+        let glow = lamp.glow.unwrap();
+        assert_eq!(
+            (glow.image.as_str(), glow.radiance),
+            ("textures/lamp_glow", 4.0)
+        );
         assert_eq!(
             file.finish("a_pane", &Finish::default()).glass,
             Some((1.5, Vec3::new(0.9, 1.0, 0.9)))
@@ -310,10 +334,10 @@ mod tests {
     #[test]
     fn wrong_lines_are_reported_with_their_numbers() {
         let text = "rough a 1.5\nrough a\nshiny a 1\nmirror a 1 1\nglass a 0.5 1 1 1\nmetal\n\
-                    plain a 3\nnormals a\nnormals a b c\nsurface a b c\nrough a nan\nemit a -1 1 1 1\nrough a 0.5";
+                    plain a 3\nnormals a\nnormals a b c\nsurface a b c\nrough a nan\nemit a -1 1 1 1\nglow a\nglow a b -1\nrough a 0.5";
         let (file, wrong) = MaterialsByHand::parse(text);
         let lines: Vec<usize> = wrong.iter().map(|w| w.line).collect();
-        assert_eq!(lines, (1..=12).collect::<Vec<_>>(), "{wrong:?}");
+        assert_eq!(lines, (1..=14).collect::<Vec<_>>(), "{wrong:?}");
         assert_eq!(
             wrong[0].to_string(),
             "line 1: roughness is from 0 to 1, not 1.5"

@@ -27,12 +27,25 @@ pub struct Finish {
     pub glass: Option<(f32, Vec3)>,
     /// Value and colour of emitted light; the largest channel of the colour is 1.
     pub emission: Option<(f32, Vec3)>,
+    /// Image of what shines.
+    pub glow: Option<Glow>,
     /// Normal map.
     pub normals: Option<NormalMap>,
     /// Image of roughness, metal or reflectance.
     pub surface: Option<SurfaceMap>,
     /// Nothing is reflected but what is stated here.
     pub plain: bool,
+}
+
+/// An image, display-encoded, of what of a surface shines.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Glow {
+    /// Its name.
+    pub image: String,
+    /// Radiance of its white, in units of display white.
+    pub radiance: f32,
+    /// The surface is a lamp of the image's mean; otherwise its light is that which the map has.
+    pub lights: bool,
 }
 
 /// An image of normals in tangent space: x to the right of the image, y up, as in OpenGL.
@@ -87,6 +100,7 @@ impl Finish {
             mirror,
             glass,
             emission,
+            glow,
             normals,
             surface,
             plain,
@@ -97,6 +111,7 @@ impl Finish {
         self.mirror = mirror.or(self.mirror);
         self.glass = glass.or(self.glass);
         self.emission = emission.or(self.emission);
+        self.glow = glow.or_else(|| self.glow.take());
         self.normals = normals.or_else(|| self.normals.take());
         self.surface = surface.or_else(|| self.surface.take());
         self.plain |= plain;

@@ -5,23 +5,22 @@
 //! | `texture_normals`, `bump_scale` | normal map; metal in its alpha, times `metalness_factor` |
 //! | `texture_base` | roughness in its alpha, if there is a normal map; the colour stays that of the map's texture |
 //! | `roughness_override` | roughness; with `texture_base`, as that renderer has it, the least roughness |
+//! | `texture_emissive`, `emissive_factor` | what of the surface glows, and how brightly |
 //! | `specular_factor` | factor of the reflectance 0.04 |
 //! | `kind CHROME`, `kind GLASS` | a mirror where nothing else is stated; glass with an index of 1.5 |
-//! | all others | no effect: those of light, because lights are found in the map |
+//! | all others | no effect. `is_light` has none, because lights are found in the map |
 
 use std::collections::HashMap;
 
 use glam::{Vec2, Vec3};
 
-use super::finish::{Finish, NormalMap, SurfaceMap, USUAL_REFLECTANCE};
+use super::finish::{Finish, Glow, NormalMap, SurfaceMap, USUAL_REFLECTANCE};
 use crate::hand_written::LineError;
 
 /// Attributes without an effect.
-const IGNORED: [&str; 10] = [
-    "emissive_factor",
+const IGNORED: [&str; 8] = [
     "is_light",
     "base_factor",
-    "texture_emissive",
     "light_styles",
     "bsp_radiance",
     "default_radiance",
@@ -43,6 +42,8 @@ pub struct Mats {
 struct Mat {
     normals: Option<String>,
     base: Option<String>,
+    emissive: Option<String>,
+    emissive_factor: Option<f32>,
     bump_scale: Option<f32>,
     roughness: Option<f32>,
     metal: Option<f32>,
@@ -127,6 +128,8 @@ impl Mat {
         match key {
             "texture_normals" => self.normals = image(),
             "texture_base" => self.base = image(),
+            "texture_emissive" => self.emissive = image(),
+            "emissive_factor" => self.emissive_factor = Some(number()?.max(0.0)),
             "bump_scale" => self.bump_scale = Some(number()?),
             "roughness_override" => {
                 // below 0: none
@@ -164,6 +167,12 @@ impl Mat {
             finish.metal = self.metal;
         }
         finish.roughness = self.roughness;
+        let factor = self.emissive_factor.unwrap_or(1.0);
+        finish.glow = self.emissive.clone().map(|image| Glow {
+            image,
+            radiance: factor,
+            lights: false,
+        });
         finish.reflectance = self.specular.map(|s| Vec3::splat(s * USUAL_REFLECTANCE));
         match self.kind {
             Some(Kind::Chrome) if self.normals.is_none() => finish.mirror = Some(Vec3::splat(0.9)),

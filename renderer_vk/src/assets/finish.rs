@@ -97,6 +97,7 @@ fn apply(
     let mut specular = Specular {
         map: c::NO_TEXTURE,
         normals: c::NO_TEXTURE,
+        glow: c::NO_TEXTURE,
         ..Specular::default()
     };
     if finish.plain {
@@ -164,6 +165,20 @@ fn apply(
             }
         }
         specular.sampler_index = sampler::REPEAT_MIP;
+    }
+    if let Some(glow) = finish.glow.as_ref().filter(|_| has_body(flags)) {
+        match source.image(&glow.image, ImageFlags::WORLD) {
+            Some((image, _)) => {
+                flags |= c::MATERIAL_GLOWS;
+                specular.glow = image;
+                specular.glow_radiance = glow.radiance;
+                specular.sampler_index = sampler::REPEAT_MIP;
+            }
+            None => faults.push(format!(
+                "material {}: the image {} of what glows is missing or unreadable; the surface stays without it",
+                material.name, glow.image
+            )),
+        }
     }
     if let Some(mirror) = finish.mirror.filter(|_| has_body(flags)) {
         flags |= c::MATERIAL_REFLECTS;

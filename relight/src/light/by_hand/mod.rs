@@ -221,13 +221,17 @@ impl RelitWorld {
         let (by_hand, faults) = MaterialsByHand::load(files, &self.name);
         self.warnings.extend(faults);
         let stated = |material: &WorldMaterial| {
-            let (value, color) = by_hand
-                .finish(&material.name, &Finish::default())
-                .emission?;
-            Some((
-                material.name.clone(),
-                color * value * SURFACE_LIGHT_RADIANCE,
-            ))
+            let finish = by_hand.finish(&material.name, &Finish::default());
+            let emitted = match (finish.emission, finish.glow.filter(|glow| glow.lights)) {
+                (Some((value, color)), _) => color * value * SURFACE_LIGHT_RADIANCE,
+                (None, Some(glow)) => {
+                    // a missing image is reported where the surface is drawn
+                    let (image, _) = crate::image::load(files, &glow.image).ok()??;
+                    image.mean_linear() * glow.radiance
+                }
+                (None, None) => return None,
+            };
+            Some((material.name.clone(), emitted))
         };
         let file = LightsByHand {
             materials: self.materials.iter().filter_map(stated).collect(),

@@ -29,6 +29,7 @@ gpu_tests! {
         maps_of_reflectance_and_smoothness_are_factors,
         a_pane_shows_the_gloss_behind_it,
         frosted_panes_scatter_what_is_behind_them,
+        maps_of_glow_show_and_light,
     ],
 }
 
@@ -374,5 +375,36 @@ fn frosted_panes_scatter_what_is_behind_them(gpu: &mut Gpu) {
             "{beyond} {exact}"
         );
         assert!((half[3] + half[4] - mean).abs() < 0.01, "{half:?}");
+    }
+}
+
+fn maps_of_glow_show_and_light(gpu: &mut Gpu) {
+    // display-encoded 188 is 0.503 linear
+    let image = square(gpu, 1, &[188, 188, 0, 255]);
+    let mut room = Scene::new(Vec3::ZERO, Vec3::X, 90.0, 12);
+    let material = room.diffuse(0.5);
+    let shining = &mut room.materials[material as usize].0;
+    shining.flags |= c::MATERIAL_GLOWS;
+    shining.specular.glow = image.texture_index();
+    shining.specular.glow_radiance = 3.0;
+    room.room(Vec3::splat(-64.0), Vec3::splat(64.0), material);
+    let shown = gpu.mean(&room, &reference(), 16);
+    let exact = 3.0 * through_byte(188.0 / 255.0);
+    assert!(
+        (shown / exact - Vec3::new(1.0, 1.0, 0.0))
+            .abs()
+            .max_element()
+            < 0.01,
+        "{shown} {exact}"
+    );
+    // the sum of bounces in a room of albedo 0.5
+    for (bounces, sum) in [(1, 1.5), (2, 1.75)] {
+        let mean = gpu.mean(&room, &bounced(bounces), 64).x;
+        println!("{mean} {}", exact * sum);
+        assert!(
+            (mean / (exact * sum) - 1.0).abs() < 0.01,
+            "{mean} {}",
+            exact * sum
+        );
     }
 }
