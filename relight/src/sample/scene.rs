@@ -3,6 +3,7 @@
 
 use std::cmp::Reverse;
 use std::f32::consts::TAU;
+use std::ops::Range;
 
 use glam::{Vec2, Vec3};
 use q3bsp::builder::MapBuilder;
@@ -12,6 +13,11 @@ use q3bsp::{DrawVert, LIGHTMAP_SIZE, ShaderId};
 const LUXEL: f32 = 16.0;
 /// Size of a texture on a wall, id units.
 const TEXTURE: f32 = 128.0;
+
+/// Corners of a ring of a ball, rings of a ball, and the most rings of one surface.
+const AROUND: usize = 64;
+const RINGS: usize = 32;
+const BAND: usize = 11;
 
 /// Where a surface's light is stored: a rectangle of a page.
 #[derive(Clone, Copy, Debug)]
@@ -238,11 +244,17 @@ impl Scene {
             .add_box_brush(shader, foot - half, foot + half + Vec3::Z * height);
     }
 
-    /// A ball of flat triangles.
-    pub fn ball(&mut self, shader: ShaderId, center: Vec3, radius: f32) -> usize {
-        const AROUND: usize = 64;
-        const RINGS: usize = 32;
-        let vertices: Vec<DrawVert> = (0..=RINGS)
+    /// A ball of flat triangles, in bands: engines refuse surfaces of more than 1000 vertices.
+    pub fn ball(&mut self, shader: ShaderId, center: Vec3, radius: f32) {
+        for first in (0..RINGS).step_by(BAND) {
+            let rings = first..(first + BAND).min(RINGS);
+            self.band(shader, center, radius, rings);
+        }
+    }
+
+    /// Rings of a ball.
+    fn band(&mut self, shader: ShaderId, center: Vec3, radius: f32, rings: Range<usize>) {
+        let vertices: Vec<DrawVert> = (rings.start..=rings.end)
             .flat_map(|ring| (0..=AROUND).map(move |at| (ring, at)))
             .map(|(ring, at)| {
                 let down = TAU * 0.5 * ring as f32 / RINGS as f32;
@@ -259,20 +271,20 @@ impl Scene {
             })
             .collect();
         let mut indices = Vec::new();
-        for ring in 0..RINGS as i32 {
+        for (row, ring) in (0..).zip(rings) {
             for at in 0..AROUND as i32 {
-                let first = ring * (AROUND as i32 + 1) + at;
+                let first = row * (AROUND as i32 + 1) + at;
                 let below = first + AROUND as i32 + 1;
                 // the triangles at the poles have no area
                 if ring > 0 {
                     indices.extend([first, first + 1, below + 1]);
                 }
-                if ring + 1 < RINGS as i32 {
+                if ring + 1 < RINGS {
                     indices.extend([first, below + 1, below]);
                 }
             }
         }
-        self.map.add_soup(shader, &vertices, &indices)
+        self.map.add_soup(shader, &vertices, &indices);
     }
 }
 

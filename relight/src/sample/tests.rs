@@ -35,6 +35,10 @@ fn the_map_is_valid_and_its_faces_look_inwards() {
         let bsp = bsp_of(sample);
         assert_eq!(bsp.warnings, []);
         assert_eq!(bsp.fogs.len(), fogs);
+        // ioquake3: SHADER_MAX_VERTEXES and SHADER_MAX_INDEXES
+        for surface in &bsp.surfaces {
+            assert!(surface.num_verts < 1000 && surface.num_indices < 6000);
+        }
         // whichever way one looks, there is a surface, and one sees its front
         let occluders = Occluders::of_world(&world_of(sample));
         let entities = bsp.entities();
