@@ -12,6 +12,23 @@ pub const USUAL_REFLECTANCE: f32 = 0.04;
 /// Roughness of metal that nothing else states.
 const USUAL_METAL_ROUGHNESS: f32 = 0.3;
 
+/// Least part of blue over red and green in the mean of a normal map: its normals mostly point away from the surface.
+const LEAST_BLUE: f32 = 1.1;
+
+/// Why an image that is stated is not used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum MapFault {
+    /// The image of roughness, metal or reflectance cannot be loaded.
+    #[error("the map of roughness {0} is missing or unreadable; the surface stays without it")]
+    NoSurface(SurfaceMap),
+    /// The normal map cannot be loaded.
+    #[error("the normal map {0} is missing or unreadable; the surface stays without it")]
+    NoNormals(String),
+    /// The image is something else. One of a single channel is grey.
+    #[error("{0} is no normal map: its mean colour is not blue; the surface stays without it")]
+    NotNormals(String),
+}
+
 /// What is stated about a material. What is `None` is as without.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Finish {
@@ -91,6 +108,47 @@ impl Finish {
         self.metal.unwrap_or(usual)
     }
 
+    /// Leaves out the map of roughness, metal or reflectance. Factors of a map of reflectance go with it: they mean
+    /// nothing alone.
+    pub fn without_surface(&self) -> Finish {
+        let mut finish = self.clone();
+        if (finish.surface.take()).is_some_and(|map| map.is_specular()) {
+            finish.roughness = None;
+            finish.reflectance = None;
+        }
+        finish
+    }
+
+    /// Leaves out the map of roughness, metal or reflectance if it is not `found`.
+    ///
+    /// # Errors
+    /// It was left out.
+    pub fn check_surface(&mut self, found: bool) -> Result<(), MapFault> {
+        match self.surface.clone().filter(|_| !found) {
+            Some(map) => {
+                *self = self.without_surface();
+                Err(MapFault::NoSurface(map))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Leaves out the normal map if it is none. `mean`: its mean colour, linear; `None` if it cannot be loaded.
+    ///
+    /// # Errors
+    /// It was left out.
+    pub fn check_normals(&mut self, mean: Option<Vec3>) -> Result<(), MapFault> {
+        let is_normal_map = |mean: Vec3| mean.z > LEAST_BLUE * mean.x.max(mean.y);
+        if mean.is_some_and(is_normal_map) {
+            return Ok(());
+        }
+        match self.normals.take() {
+            Some(map) if mean.is_some() => Err(MapFault::NotNormals(map.image)),
+            Some(map) => Err(MapFault::NoNormals(map.image)),
+            None => Ok(()),
+        }
+    }
+
     /// What another states replaces what this one states.
     pub(super) fn overlay(&mut self, other: &Finish) {
         let Finish {
@@ -158,6 +216,16 @@ impl SurfaceMap {
     /// Whether [`load`](Self::load) returns reflectance and smoothness, not roughness and metal.
     pub fn is_specular(&self) -> bool {
         matches!(self, SurfaceMap::Specular(_))
+    }
+
+    /// The name of its image; of two images, that of metal.
+    pub fn image(&self) -> &str {
+        match self {
+            SurfaceMap::RoughnessMetal(image)
+            | SurfaceMap::SmoothnessMetal(image)
+            | SurfaceMap::Specular(image)
+            | SurfaceMap::Alphas { metal: image, .. } => image,
+        }
     }
 
     /// Loads it in one of two layouts: roughness in green and metal in blue, or, if it [is](Self::is_specular) specular,
@@ -251,6 +319,43 @@ mod tests {
         assert_eq!(both, Some(vec![255, 40, 1, 255, 255, 40, 2, 255]));
         assert_eq!(load(alphas(Some("none"), "b")), None);
         assert_eq!(load(SurfaceMap::Specular("none".to_owned())), None);
+    }
+
+    #[test]
+    fn unusable_images_are_left_out() {
+        let of_map = |surface| Finish {
+            roughness: Some(0.5),
+            surface: Some(surface),
+            ..Finish::default()
+        };
+        let checked = |mut finish: Finish, found| {
+            let fault = finish.check_surface(found);
+            (finish, fault)
+        };
+        let specular = SurfaceMap::Specular("a_s".to_owned());
+        let found = checked(of_map(specular.clone()), true);
+        assert_eq!(found, (of_map(specular.clone()), Ok(())));
+        let fault = Err(MapFault::NoSurface(specular.clone()));
+        assert_eq!(checked(of_map(specular), false), (Finish::default(), fault));
+        let (rough, _) = checked(of_map(SurfaceMap::RoughnessMetal("a_r".to_owned())), false);
+        assert_eq!((rough.roughness, rough.metal_or_usual()), (Some(0.5), 0.0));
+        let normals = |mean| {
+            let mut finish = Finish {
+                normals: Some(NormalMap {
+                    image: "a_n".to_owned(),
+                    scale: Vec2::ONE,
+                }),
+                ..Finish::default()
+            };
+            let fault = finish.check_normals(mean);
+            (finish.normals.is_some(), fault)
+        };
+        let name = || "a_n".to_owned();
+        let blue = Vec3::new(0.2, 0.2, 1.0);
+        assert_eq!(normals(Some(blue)), (true, Ok(())));
+        let grey = Err(MapFault::NotNormals(name()));
+        assert_eq!(normals(Some(Vec3::ONE)), (false, grey));
+        assert_eq!(normals(None), (false, Err(MapFault::NoNormals(name()))));
     }
 
     #[test]

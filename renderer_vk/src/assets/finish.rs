@@ -1,7 +1,6 @@
 //! Applies what packs and files of materials state (`relight::materials::finish`): it overrides what a material's stages
 //! decide about its reflection.
 
-use glam::Vec3;
 use relight::materials::by_hand::MaterialsByHand;
 use relight::materials::finish::Finish;
 use shaders::types::{Dielectric, Specular, constants as c};
@@ -22,8 +21,6 @@ pub struct OfScript {
 
 /// Reflectance at normal incidence that materials other than metal and gems stay below.
 const LITTLE: f32 = 0.2;
-/// Least part of blue over red and green in the mean of a normal map: its normals mostly point away from the surface.
-const LEAST_BLUE: f32 = 1.1;
 
 impl Materials {
     /// Replaces the files of materials, and changes all materials accordingly. Returns what is wrong with their images.
@@ -120,49 +117,34 @@ fn apply(
             specular.roughness = roughness;
         }
     } else if has_body(flags) && flags & c::MATERIAL_TRANSLUCENT == 0 {
+        let mut finish = finish.clone();
+        let map = (finish.surface.as_ref()).and_then(|map| source.surface_map(map));
+        let normals = (finish.normals.as_ref())
+            .and_then(|map| Some(source.image(&map.image, ImageFlags::DATA)?.0));
+        let mean = normals.map(|image| source.mean(image).truncate());
+        let checks = [
+            finish.check_surface(map.is_some()),
+            finish.check_normals(mean),
+        ];
+        let name = &material.name;
+        let checks = checks.into_iter().filter_map(Result::err);
+        faults.extend(checks.map(|fault| format!("material {name}: {fault}")));
         if finish.is_rough() {
             flags |= c::MATERIAL_ROUGH;
             specular.roughness = finish.roughness_or_usual();
             specular.reflectance = finish.reflectance_or_usual();
             specular.metal = finish.metal_or_usual();
         }
-        let name = &material.name;
-        let mut missing = |what: String| {
-            faults.push(format!(
-                "material {name}: {what} is missing or unreadable; the surface stays without it"
-            ));
-        };
-        if let Some(surface) = &finish.surface {
-            match source.surface_map(surface) {
-                Some(map) => {
-                    specular.map = map;
-                    if surface.is_specular() {
-                        flags |= c::MATERIAL_SPECULAR_MAP;
-                    }
-                }
-                None => {
-                    missing(format!("the map of roughness {surface}"));
-                    if finish.roughness.is_none() && finish.metal.is_none() || surface.is_specular()
-                    {
-                        flags &= !c::MATERIAL_ROUGH;
-                        specular.metal = 0.0;
-                    }
-                }
+        if let (Some(surface), Some(map)) = (&finish.surface, map) {
+            specular.map = map;
+            if surface.is_specular() {
+                flags |= c::MATERIAL_SPECULAR_MAP;
             }
         }
-        if let Some(map) = &finish.normals {
-            match source.image(&map.image, ImageFlags::DATA) {
-                Some((normals, _)) if is_normal_map(source.mean(normals).truncate()) => {
-                    flags |= c::MATERIAL_NORMALS;
-                    specular.normals = normals;
-                    specular.normal_scale = map.scale;
-                }
-                Some(_) => faults.push(format!(
-                    "material {name}: {} is no normal map: its mean colour is not blue; the surface stays without it",
-                    map.image
-                )),
-                None => missing(format!("the normal map {}", map.image)),
-            }
+        if let (Some(map), Some(normals)) = (&finish.normals, normals) {
+            flags |= c::MATERIAL_NORMALS;
+            specular.normals = normals;
+            specular.normal_scale = map.scale;
         }
         specular.sampler_index = sampler::REPEAT_MIP;
     }
@@ -187,9 +169,4 @@ fn apply(
     material.flags = flags | emitter;
     material.dielectric = dielectric;
     material.specular = specular;
-}
-
-/// Whether an image of this mean colour (linear) can be a normal map. One of a single channel is grey.
-fn is_normal_map(mean: Vec3) -> bool {
-    mean.z > LEAST_BLUE * mean.x.max(mean.y)
 }
