@@ -60,12 +60,11 @@ pub(super) fn baked_light_flag(found: Option<BakedLight>, stage: &Stage) -> u32 
 pub fn material_flags(shader: &Shader, class: LightmapClass) -> u32 {
     let found = light::classify(shader);
     let mut flags = match found.class {
-        SurfaceClass::Opaque => 0,
+        SurfaceClass::Opaque | SurfaceClass::Translucent => 0,
         SurfaceClass::CutOut => c::MATERIAL_CUT_OUT,
-        SurfaceClass::Translucent => c::MATERIAL_TRANSLUCENT,
         SurfaceClass::Mirror | SurfaceClass::Portal => c::MATERIAL_PORTAL,
-        SurfaceClass::Glass => c::MATERIAL_GLASS | c::MATERIAL_TRANSLUCENT,
-        SurfaceClass::Liquid => c::MATERIAL_LIQUID | c::MATERIAL_TRANSLUCENT,
+        SurfaceClass::Glass => c::MATERIAL_GLASS,
+        SurfaceClass::Liquid => c::MATERIAL_LIQUID,
         SurfaceClass::Sky => c::MATERIAL_SKY,
         SurfaceClass::Fog => c::MATERIAL_FOG,
         SurfaceClass::Invisible => c::MATERIAL_INVISIBLE,
@@ -73,9 +72,7 @@ pub fn material_flags(shader: &Shader, class: LightmapClass) -> u32 {
     if found.liquid {
         flags |= c::MATERIAL_LIQUID;
     }
-    // an alpha-tested first stage may also blend: points that pass the test still show the background
-    let first_blends = shader.stages.first().is_some_and(|s| s.blend.is_some());
-    if first_blends && found.class == SurfaceClass::CutOut {
+    if found.translucent {
         flags |= c::MATERIAL_TRANSLUCENT;
     }
     match shader.cull {

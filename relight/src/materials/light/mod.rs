@@ -59,6 +59,8 @@ pub struct LightClass {
     /// Some of what is drawn does not depend on incident light. True for every material without lightmap, vertex
     /// light or `lightingDiffuse`, so a glow alone is no light source to the map compiler.
     pub glowing: bool,
+    /// What is behind it is seen through it; of a cut-out, not only through its holes.
+    pub translucent: bool,
     /// It is water, slime or lava, seen through or not.
     pub liquid: bool,
     /// Both sides are drawn.
@@ -122,6 +124,12 @@ pub fn classify(shader: &Shader) -> LightClass {
         class,
         emitter: is_emitter(shader),
         glowing: is_glowing(shader),
+        // an alpha-tested first stage may also blend: points that pass the test still show the background
+        translucent: match class {
+            SurfaceClass::Translucent | SurfaceClass::Glass | SurfaceClass::Liquid => true,
+            SurfaceClass::CutOut => first_blends,
+            _ => false,
+        },
         liquid,
         two_sided: shader.cull == Cull::None,
         passed: class == SurfaceClass::Opaque && !liquid && is_passed(shader),
