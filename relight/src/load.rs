@@ -10,6 +10,7 @@ use crate::files::{FileError, GameFiles};
 use crate::image;
 use crate::light::{self, LightColor, LightReport, TriangleLight};
 use crate::materials::Materials;
+use crate::materials::by_hand::MaterialsByHand;
 use crate::overbright::{self, MAP_OVERBRIGHT_BITS};
 use crate::world::geometry::Geometry;
 use crate::world::material::{lighting_of, lightmap_of};
@@ -230,6 +231,7 @@ impl RelitWorld {
             indices: geometry.indices,
             pages: pages.pages,
             flares,
+            by_hand: MaterialsByHand::default(),
             fogs,
             lights: Vec::new(),
             point_lights,

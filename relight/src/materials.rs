@@ -9,6 +9,8 @@ mod of_pack;
 
 use crate::files::GameFiles;
 use crate::image;
+use by_hand::MaterialsByHand;
+use finish::Finish;
 use shaderscript::{Diagnostic, ImplicitKind, Library, Shader};
 use std::collections::{HashMap, HashSet};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
@@ -152,6 +154,18 @@ impl Materials {
             script,
             fault,
         }
+    }
+
+    /// What packs and files by hand state about the reflection of a material that is drawn by `shader`.
+    pub fn finish(
+        &self,
+        files: &dyn GameFiles,
+        name: &str,
+        shader: &Shader,
+        by_hand: &MaterialsByHand,
+    ) -> Finish {
+        let exists = |image: &str| self.image_exists(files, image);
+        by_hand.finish(name, &self.of_pack(name, shader, &exists))
     }
 
     /// Warns that the default is drawn instead of a material; once for each name, whoever finds out first.

@@ -21,6 +21,7 @@ use crate::emitters::{
     TriangleLight,
 };
 use crate::exposure::{self, Exposure};
+use crate::materials::by_hand::MaterialsByHand;
 use crate::overbright;
 use glam::Vec3;
 use q3bsp::{Bsp, Lightmap};
@@ -52,6 +53,8 @@ pub struct RelitWorld {
     pub pages: Vec<Lightmap>,
     /// Coronas.
     pub flares: Vec<Flare>,
+    /// Files of materials, if they were read.
+    pub by_hand: MaterialsByHand,
     /// Fog volumes; a surface's `fog` is an index into this plus 1.
     pub fogs: Vec<WorldFog>,
     /// Emitting triangles; those of one surface follow each other.

@@ -386,7 +386,8 @@ impl World {
         let relit = &mut self.data.relit;
         let warned = relit.warnings.len();
         let before_files = relit.lighting();
-        let by_hand = relit.emit_by_hand(&*files);
+        relit.emit_by_hand(&*files);
+        let by_hand = relit.by_hand.clone();
         self.before = Some(Before {
             files: before_files,
             lights: relit.lighting(),

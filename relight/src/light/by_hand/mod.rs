@@ -215,9 +215,9 @@ impl RelitWorld {
         lights_file(&self.name)
     }
 
-    /// Applies the lines of [files of materials](MaterialsByHand) that state light. Returns the files, whose errors become
+    /// Reads [files of materials](MaterialsByHand), and applies their lines that state light. Their errors become
     /// warnings of the world.
-    pub fn emit_by_hand(&mut self, files: &dyn GameFiles) -> MaterialsByHand {
+    pub fn emit_by_hand(&mut self, files: &dyn GameFiles) {
         let (by_hand, faults) = MaterialsByHand::load(files, &self.name);
         self.warnings.extend(faults);
         let stated = |material: &WorldMaterial| {
@@ -240,7 +240,7 @@ impl RelitWorld {
         if !file.materials.is_empty() {
             file.apply(self);
         }
-        by_hand
+        self.by_hand = by_hand;
     }
 
     /// Applies files of materials, then the file of lights beside the map.
