@@ -7,6 +7,8 @@ use std::sync::Arc;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use relight::export::material_json;
+use relight::materials::by_hand::MaterialsByHand;
+use relight::materials::finish::Finish;
 use relight::{GameFiles, Options, RelitWorld, WorldMaterial};
 use serde::Serialize;
 use serde_json::Value;
@@ -141,6 +143,14 @@ pub fn run(args: &MaterialArgs) -> Result<ExitCode> {
     if let Some(world) = &mut world {
         world.measure_materials(files);
     }
+    let by_hand = match &world {
+        Some(world) => world.by_hand.clone(),
+        None => {
+            let (by_hand, faults) = MaterialsByHand::load(files, "");
+            faults.iter().for_each(|fault| log::warn!("{fault}"));
+            by_hand
+        }
+    };
     let mut reports = Vec::new();
     let mut faults = 0;
     for name in &args.names {
@@ -151,7 +161,9 @@ pub fn run(args: &MaterialArgs) -> Result<ExitCode> {
         });
         for material in used.into_iter().chain(&own) {
             faults += usize::from(material.resolved.fault.is_some());
-            reports.push(Report::new(files, material, &diagnostics));
+            let shader = &material.resolved.shader;
+            let finish = materials.finish(files, &material.name, shader, &by_hand);
+            reports.push(Report::new(files, material, &finish, &diagnostics));
         }
     }
     if args.json {
@@ -165,9 +177,15 @@ pub fn run(args: &MaterialArgs) -> Result<ExitCode> {
     })
 }
 
-/// The report about one material, as text. `all`: diagnostics of all scripts.
-pub fn describe(files: &dyn GameFiles, material: &WorldMaterial, all: &[Diagnostic]) -> String {
-    Report::new(files, material, all).to_string()
+/// The report about one material, as text. `finish`: what is stated about its reflection; `all`: diagnostics of all
+/// scripts.
+pub fn describe(
+    files: &dyn GameFiles,
+    material: &WorldMaterial,
+    finish: &Finish,
+    all: &[Diagnostic],
+) -> String {
+    Report::new(files, material, finish, all).to_string()
 }
 
 /// Materials of a map with a name, or whose image has it: one for each set of flags and kind of lighting.
@@ -189,7 +207,12 @@ fn used_in<'a>(world: &'a RelitWorld, name: &str) -> Vec<&'a WorldMaterial> {
 }
 
 impl Report {
-    fn new(files: &dyn GameFiles, material: &WorldMaterial, all: &[Diagnostic]) -> Report {
+    fn new(
+        files: &dyn GameFiles,
+        material: &WorldMaterial,
+        finish: &Finish,
+        all: &[Diagnostic],
+    ) -> Report {
         let class = &material.class;
         let about = |d: &&Diagnostic| {
             let definition = material.resolved.script.as_ref();
@@ -199,7 +222,7 @@ impl Report {
             })
         };
         Report {
-            material: material_json(material),
+            material: material_json(material, finish),
             light: Light {
                 class: format!("{:?}", class.class),
                 two_sided: class.two_sided,

@@ -22,7 +22,7 @@ impl Viewer {
         // a map that cannot be read leaves the one that is shown
         let bytes = files.read(&name)?.unwrap_or_default();
         Bsp::parse(&bytes).with_context(|| name.clone())?;
-        let (_, diagnostics) = load_scripts(&*files);
+        let scripts = load_scripts(&*files);
         let loaded = view::load(
             &mut self.renderer,
             Arc::clone(&files),
@@ -61,7 +61,7 @@ impl Viewer {
         self.map = Some(Map {
             name,
             files,
-            diagnostics,
+            scripts,
             entities,
             cameras,
             probe: None,

@@ -4,7 +4,7 @@ use glam::Vec3;
 use relight::light::LightShare;
 use relight::overbright;
 use relight::probe::{Met, Probe, Source, shown_on_white};
-use relight::{GameFiles, RelitWorld};
+use relight::{GameFiles, Materials, RelitWorld};
 use shaderscript::Diagnostic;
 
 use crate::material::describe;
@@ -51,10 +51,12 @@ impl Picked {
         probe: &Probe,
         met: Met,
         files: &dyn GameFiles,
-        diagnostics: &[Diagnostic],
+        (materials, diagnostics): &(Materials, Vec<Diagnostic>),
     ) -> Option<Self> {
         let surface = world.surfaces.get(met.surface as usize)?;
         let material = world.material_of(surface)?;
+        let shader = &material.resolved.shader;
+        let finish = materials.finish(files, &material.name, shader, &world.by_hand);
         let location = material.resolved.script.as_ref().map(|s| &s.location);
         let above = met.point + met.normal;
         let cluster = world.bsp.cluster_at(above);
@@ -101,7 +103,7 @@ impl Picked {
             met,
             material: material.name.clone(),
             defined: location.map(|l| format!("{}:{}", l.file, l.line)),
-            report: describe(files, material, diagnostics),
+            report: describe(files, material, &finish, diagnostics),
             facts,
             light,
         })

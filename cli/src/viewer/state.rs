@@ -9,10 +9,10 @@ use clap::ValueEnum;
 use glam::{UVec2, Vec2};
 use gui::egui::{self, PlatformOutput, RawInput};
 use gui::{Change, CostHistory, Gui, Motion, Screen};
-use relight::GameFiles;
 use relight::light::ChangeableLights;
 use relight::probe::Probe;
 use relight::viewpoints::Viewpoint;
+use relight::{GameFiles, Materials};
 use renderer_vk::api::{Look, Picture, RefDef, RefEntity};
 use renderer_vk::settings::{Given, Preset, flags, row};
 use renderer_vk::{Renderer, Settings};
@@ -80,7 +80,7 @@ pub struct Map {
     /// Its game path.
     pub name: String,
     pub files: Arc<dyn GameFiles>,
-    pub diagnostics: Vec<Diagnostic>,
+    pub scripts: (Materials, Vec<Diagnostic>),
     pub entities: Vec<RefEntity>,
     /// Cameras by name.
     pub cameras: Vec<(String, Camera)>,
@@ -424,8 +424,8 @@ impl Viewer {
         // what lies before the near plane is not drawn
         let near = camera.origin + ray * (self.settings.znear / ray.dot(forward));
         let met = probe.surface(near, ray);
-        self.picked = met
-            .and_then(|met| Picked::new(&world.relit, probe, met, &*map.files, &map.diagnostics));
+        self.picked =
+            met.and_then(|met| Picked::new(&world.relit, probe, met, &*map.files, &map.scripts));
     }
 
     /// Draws the looks, then the panels.

@@ -1,6 +1,7 @@
 //! How strongly materials glow: as strongly as the lights that they are.
 
 use super::images::Encoded;
+use super::layers::Layer;
 use super::look::{Look, Picture, look as read_look, ratio};
 use super::stack::Moment;
 use super::{Export, ExportError, ImagePlace};
@@ -62,15 +63,18 @@ impl Export<'_> {
         }
     }
 
-    /// What other programs can say of a material whose lights have the mean radiance `radiance`; `clear`: whether glass
-    /// and liquids refract; `moment`: when.
+    /// What other programs can say of a layer whose lights have the mean radiance `radiance`; `lit`: whether they
+    /// compute light, so that surfaces reflect and refract it; `moment`: when.
     pub(super) fn look(
         &self,
-        material: &WorldMaterial,
+        layer: &Layer<'_>,
         radiance: Option<Vec3>,
-        clear: bool,
+        lit: bool,
         moment: Moment,
     ) -> Look {
+        let material = &*layer.material;
+        let finish = self.finish(layer.whole);
+        let clear = lit && !finish.plain;
         let mut mean = |name: &str| self.mean(material, &Picture::File(name.to_owned()));
         let mut look = read_look(material, clear, Moment::Mean, &mut mean);
         let usual = look.glow_factor;
@@ -78,6 +82,9 @@ impl Export<'_> {
             look.take_factors(&read_look(material, clear, moment, &mut mean));
         }
         let pulse = ratio(look.glow_factor, usual);
+        if lit {
+            self.reflect(layer, &finish, &mut look);
+        }
         if !self.options.lights {
             return look;
         }

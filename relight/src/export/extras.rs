@@ -1,5 +1,6 @@
 //! What formats of other programs have no words for, as JSON: whole materials, entities with all their keys.
 
+use crate::materials::finish::{Finish, NormalMap, SurfaceMap};
 use crate::world::{StyleLight, StyleStrength, WorldMaterial};
 use glam::{Vec2, Vec3};
 use q3bsp::Entity;
@@ -8,8 +9,8 @@ use shaderscript::{
     AlphaGen, Cull, Deform, DepthFunc, RgbGen, Shader, Stage, StageImage, TcGen, TcMod, Wave,
 };
 
-/// A material: its flags in the map and the content of its script.
-pub fn material(material: &WorldMaterial) -> Value {
+/// A material: its flags in the map, the content of its script, and what is stated about its reflection.
+pub fn material(material: &WorldMaterial, finish: &Finish) -> Value {
     let shader = &material.resolved.shader;
     let mut out = json!({
         "name": material.name,
@@ -38,7 +39,31 @@ pub fn material(material: &WorldMaterial) -> Value {
         out["fault"] = json!(fault);
     }
     directives(definition, &mut out);
+    let reflection = reflection(finish);
+    if !reflection.is_empty() {
+        out["reflection"] = json!(reflection);
+    }
     out
+}
+
+/// What packs and files by hand state about reflection.
+fn reflection(finish: &Finish) -> Map<String, Value> {
+    let mut map = Map::new();
+    let mut put = |key: &str, value: Option<Value>| {
+        map.extend(value.map(|value| (key.to_owned(), value)));
+    };
+    put("roughness", finish.roughness.map(|r| json!(r)));
+    put("reflectance", finish.reflectance.map(vector));
+    put("metal", finish.metal.map(|m| json!(m)));
+    put("mirror", finish.mirror.map(vector));
+    let glass = |(index, part)| json!({"index": index, "through": vector(part)});
+    put("glass", finish.glass.map(glass));
+    let normals = |n: &NormalMap| json!({"image": n.image, "scale": n.scale.to_array()});
+    put("normals", finish.normals.as_ref().map(normals));
+    let surface = |map: &SurfaceMap| json!(map.to_string());
+    put("surface", finish.surface.as_ref().map(surface));
+    put("plain", finish.plain.then_some(Value::Bool(true)));
+    map
 }
 
 /// Keywords of a script outside its stages, without those at their defaults.

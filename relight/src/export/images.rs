@@ -272,6 +272,10 @@ fn make(
                 Encoded::png(&edited(&image, *edit), &format!("{stem}_{}", edit.label()))
             })
             .transpose(),
+        Picture::Reflection(map) => map
+            .load(files)
+            .map(|(image, path)| Encoded::png(&image, &path))
+            .transpose(),
         Picture::Baked { name, stages, part } => stack::bake(files, shader, stages, *part)
             .map(|image| {
                 let label = match part {

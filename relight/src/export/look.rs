@@ -1,4 +1,5 @@
-//! A material as far as other programs can say it: one image for colour, one for glow, transparency, refraction.
+//! A material as far as other programs can say it: one image for colour, one for glow, transparency, refraction,
+//! reflection.
 //!
 //! Stages are classified by their effect, as in [`crate::materials::light`]. Those whose images lie on the
 //! surface in the same way become one picture; of what moves against that, the brightest addition is kept as glow and
@@ -7,6 +8,7 @@
 use super::film::Film;
 use super::layers::draws_nothing;
 use super::losses::report_losses;
+use super::reflection::{Reflection, ReflectionImage};
 use super::stack::{self, Moment, Part, tiling};
 use crate::materials::light::{
     LightLinear, SurfaceClass, base_stage, cut_out_stage, glow_stages, refraction_index,
@@ -27,6 +29,8 @@ const LEAST_TRANSMISSION: f32 = 0.15;
 const LEAST_COLOR: f32 = 0.05;
 /// Roughness of what has a stage that shows its surroundings.
 const SHINY: f32 = 0.3;
+/// End of the message about such a stage.
+pub const SURROUNDINGS: &str = "a picture of the surroundings; said by roughness";
 
 /// A change of an image's alpha.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -57,6 +61,8 @@ pub enum Picture {
     File(String),
     /// The same with another alpha.
     Edited(String, Edit),
+    /// An image of reflection.
+    Reflection(ReflectionImage),
     /// Several stages of a material together.
     Baked {
         /// The material, lower case.
@@ -88,6 +94,17 @@ pub struct Slot {
     pub clamp: bool,
     /// Changes to the texture coordinates.
     pub tc_mods: Vec<TcMod>,
+}
+
+impl Slot {
+    /// A picture that repeats, at the texture coordinates of the surface.
+    pub fn plain(picture: Picture) -> Slot {
+        Slot {
+            picture,
+            clamp: false,
+            tc_mods: Vec::new(),
+        }
+    }
 }
 
 /// How a surface hides what is behind it.
@@ -137,15 +154,18 @@ pub struct Look {
     pub lightmapped: bool,
     /// What glass and liquids do to light.
     pub dielectric: Option<Dielectric>,
-    /// Whether it is a mirror.
-    pub mirror: bool,
-    /// Roughness, 0..1.
-    pub roughness: f32,
+    /// How it reflects.
+    pub reflection: Reflection,
     /// Properties that the format cannot represent.
     pub lost: Vec<String>,
 }
 
 impl Look {
+    /// Whether something of it is an image.
+    pub fn has_pictures(&self) -> bool {
+        self.color.is_some() || self.glow.is_some() || self.reflection.has_pictures()
+    }
+
     /// Takes what changes from the look of another moment.
     pub fn take_factors(&mut self, now: &Look) {
         self.glow_factor = now.glow_factor;
@@ -224,13 +244,15 @@ pub fn look(
         vertex_alpha: None,
         lightmapped,
         dielectric: None,
-        mirror: class.class == SurfaceClass::Mirror,
-        roughness: if class.environment { SHINY } else { 1.0 },
+        reflection: if class.class == SurfaceClass::Mirror {
+            Reflection::mirror()
+        } else if class.environment {
+            Reflection::usual(SHINY)
+        } else {
+            Reflection::DIFFUSE
+        },
         lost: Vec::new(),
     };
-    if look.mirror {
-        look.roughness = 0.0;
-    }
     report_losses(shader, &mut look.lost);
     if !material.baked.styles.is_empty() {
         let styles = material.baked.styles.len();
@@ -365,9 +387,7 @@ fn group_of(shader: &Shader, base: usize, stage: &Stage, lost: &mut Vec<String>)
         if alike {
             group.push(i);
         } else if other.tc_gen == TcGen::Environment {
-            lost.push(format!(
-                "stage {i}: a picture of the surroundings; said by roughness"
-            ));
+            lost.push(format!("stage {i}: {SURROUNDINGS}"));
         } else if by_vertex {
             lost.push(format!("stage {i}: weighted by vertex alpha; left out"));
         } else {
@@ -500,7 +520,7 @@ fn dielectric(shader: &Shader, drawn: &LightLinear, look: &mut Look) {
         ),
     });
     look.alpha = Alpha::Opaque;
-    look.roughness = 0.0;
+    look.reflection = Reflection::usual(0.0);
     // The surface of a volume has an inside and an outside; its back is the way out.
     if look.dielectric.is_some_and(|d| d.liquid.is_some()) {
         look.two_sided = false;

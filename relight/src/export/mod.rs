@@ -6,6 +6,7 @@
 //! * `model_file`: models that entities name besides brushes.
 //! * `layers`: stages weighted by vertex alpha, as materials of their own.
 //! * `look`: a material's stages as far as other programs can say them.
+//! * `reflection`: roughness, metal, reflectance and normals that packs and files state.
 //! * [`ImageStore`]: images as files, each made once for all maps.
 //!
 //! # Space
@@ -29,6 +30,7 @@ mod map;
 mod model_file;
 mod obj;
 mod output;
+mod reflection;
 mod shown;
 mod sky;
 mod stack;

@@ -6,6 +6,7 @@ use super::images::Encoded;
 use super::layers::{Layer, layers};
 use super::look::{Alpha, Look, Slot, affine};
 use super::output::Output;
+use super::reflection::Reflection;
 use super::stack::Moment;
 use super::{Export, ExportError, ExportReport};
 use crate::world::{WorldMaterial, WorldVertex};
@@ -20,6 +21,8 @@ use support::slice;
 const FADES: &str = "fades by vertex alpha, which OBJ lacks; it does not fade";
 /// Warning for a layer weighted by vertex alpha.
 const LAYERED: &str = "is weighted by vertex alpha, which OBJ lacks; it is on triangles that it covers by half or more";
+/// Warning for a material with a map of roughness.
+const MAPPED: &str = "has a map of roughness, metal or reflectance, which OBJ lacks; it is diffuse";
 
 /// Whether a layer covers half of a triangle or more.
 fn mostly(layer: &Layer<'_>, corners: [WorldVertex; 3]) -> bool {
@@ -53,8 +56,12 @@ pub(super) fn write(source: &Export<'_>, output: &mut Output) -> Result<ExportRe
             let lowest = layer.stage().is_none();
             let radiance = radiances.get(index as usize).copied();
             let radiance = radiance.filter(|_| lowest);
-            let mut look = source.look(&layer.material, radiance, true, Moment::Mean);
+            let mut look = source.look(&layer, radiance, true, Moment::Mean);
             layer.weigh(source, &mut look);
+            if look.reflection.surface.take().is_some() {
+                look.reflection.reflectance = None;
+                look.lost.push(MAPPED.to_owned());
+            }
             if look.vertex_alpha.is_some() && look.alpha != Alpha::Opaque {
                 look.lost
                     .push(if lowest { FADES } else { LAYERED }.to_owned());
@@ -194,7 +201,17 @@ fn material_entry(
     } else {
         [x, y, z]
     };
-    let _ = writeln!(text, "Kd {r} {g} {b}\nKs 0 0 0\nillum 1");
+    let _ = writeln!(text, "Kd {r} {g} {b}");
+    let reflection = &look.reflection;
+    match reflection.reflectance.filter(|_| look.dielectric.is_none()) {
+        Some(Vec3 { x, y, z }) => {
+            let Reflection {
+                roughness, metal, ..
+            } = reflection;
+            let _ = writeln!(text, "Ks {x} {y} {z}\nPr {roughness}\nPm {metal}\nillum 2");
+        }
+        None => text.push_str("Ks 0 0 0\nillum 1\n"),
+    }
     let e = look.glow_factor;
     if e != Vec3::ZERO {
         let _ = writeln!(text, "Ke {} {} {}", e.x, e.y, e.z);
@@ -214,6 +231,7 @@ fn material_entry(
         text.push_str(&map("map_d", &look.color)?);
     }
     text.push_str(&map("map_Ke", &look.glow)?);
+    text.push_str(&map("norm", &reflection.normals)?);
     text.push('\n');
     Ok(text)
 }

@@ -2,6 +2,7 @@
 //! of vertices.
 
 use super::look::{Look, Picture, Slot, VertexColor};
+use super::reflection::Reflection;
 use super::stack::Part;
 use crate::overbright;
 use glam::Vec3;
@@ -34,7 +35,7 @@ pub fn glows(look: &Look) -> bool {
 /// anything of its own, at this moment or another ([`glows()`]).
 pub fn make_shown_as(look: &mut Look, light: Vec3, glows: bool) -> bool {
     look.dielectric = None;
-    look.mirror = false;
+    look.reflection = Reflection::DIFFUSE;
     let glow = std::mem::replace(&mut look.glow_factor, Vec3::ZERO);
     let picture = look.glow.take();
     if !glows {
@@ -78,9 +79,11 @@ pub fn make_shown_as(look: &mut Look, light: Vec3, glows: bool) -> bool {
 fn film_message(glow: &Slot) -> String {
     let what = match &glow.picture {
         Picture::File(name) | Picture::Edited(name, _) => format!(" of {name}"),
-        Picture::Baked { .. } | Picture::Film(_) | Picture::Sky { .. } | Picture::Panorama(_) => {
-            String::new()
-        }
+        Picture::Reflection(_)
+        | Picture::Baked { .. }
+        | Picture::Film(_)
+        | Picture::Sky { .. }
+        | Picture::Panorama(_) => String::new(),
     };
     format!(
         "its glow{what} lies on the surface in another way than its colour; the colour is shown"
@@ -114,8 +117,7 @@ mod tests {
             vertex_alpha: None,
             lightmapped: true,
             dielectric: None,
-            mirror: false,
-            roughness: 1.0,
+            reflection: Reflection::DIFFUSE,
             lost: Vec::new(),
         }
     }

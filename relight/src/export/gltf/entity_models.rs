@@ -142,10 +142,11 @@ impl Document<'_> {
             radiance: None,
             shown: mean,
         };
-        let (mut look, multiplied) = look_in(source, &material, lighting);
+        let layer = Layer::only(&material);
+        let (mut look, multiplied) = look_in(source, &layer, lighting);
         let shaded = shown && multiplied && lit;
-        let pulse = make_moving(source, &material, lighting, &mut look, None);
-        let number = self.add_material(&Layer::only(&material), &look, pulse.as_ref())?;
+        let pulse = make_moving(source, &layer, lighting, &mut look, None);
+        let number = self.add_material(&layer, &look, pulse.as_ref())?;
         let lost = look.lost.iter();
         self.warnings
             .extend(lost.map(|l| format!("material {name}: {l}")));

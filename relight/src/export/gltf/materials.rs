@@ -5,11 +5,13 @@ use super::pulse::Pulse;
 use crate::export::images::Encoded;
 use crate::export::layers::Layer;
 use crate::export::look::{Alpha, Look, Picture, Slot, affine};
+use crate::export::reflection::Reflection;
 use crate::export::{Export, ExportError, Lightmaps, extras};
+use crate::materials::finish::USUAL_REFLECTANCE;
 use crate::world::WorldMaterial;
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use serde_json::{Map, Value, json};
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -120,9 +122,10 @@ impl Maker<'_> {
         pulse: Option<&Pulse>,
     ) -> Result<Value, ExportError> {
         let material = &*layer.material;
+        let reflection = &look.reflection;
         let mut base = json!({
-            "metallicFactor": f32::from(u8::from(look.mirror)),
-            "roughnessFactor": look.roughness,
+            "metallicFactor": reflection.metal,
+            "roughnessFactor": reflection.roughness,
         });
         let mut out = Map::new();
         let mut extensions = Map::new();
@@ -136,8 +139,14 @@ impl Maker<'_> {
             if look.factor != glam::Vec4::ONE || pulse.is_some_and(Pulse::factor_varies) {
                 base.insert("baseColorFactor".into(), json!(look.factor.to_array()));
             }
+            if let Some(texture) = self.map(material, &reflection.surface)? {
+                base.insert("metallicRoughnessTexture".into(), texture);
+            }
         }
         out.insert("pbrMetallicRoughness".into(), base);
+        if let Some(texture) = self.map(material, &reflection.normals)? {
+            out.insert("normalTexture".into(), texture);
+        }
         let peak = pulse.map_or(0.0, Pulse::brightest);
         let brightest = look.glow_factor.max_element().max(peak);
         let glows = brightest > 0.0 && brightest.is_finite();
@@ -150,10 +159,10 @@ impl Maker<'_> {
             if let Some(texture) = self.texture(material, look.glow.as_ref(), &slot)? {
                 out.insert("emissiveTexture".into(), texture);
             }
-            let factor = look.glow_factor.max(glam::Vec3::ZERO) / brightest.max(1.0);
+            let factor = look.glow_factor.max(Vec3::ZERO) / brightest.max(1.0);
             out.insert(
                 "emissiveFactor".into(),
-                json!(factor.min(glam::Vec3::ONE).to_array()),
+                json!(factor.min(Vec3::ONE).to_array()),
             );
             if brightest > 1.0 {
                 self.put(
@@ -181,6 +190,8 @@ impl Maker<'_> {
         let shown = self.source.options.lightmaps == Lightmaps::Vertices;
         if shown {
             self.put(&mut extensions, "KHR_materials_unlit", json!({}));
+        } else {
+            self.reflectance(material, reflection, &mut extensions)?;
         }
         // Light that a white surface shows as white is an irradiance of pi.
         let lightmap = self.lightmap.filter(|_| look.lightmapped);
@@ -193,7 +204,7 @@ impl Maker<'_> {
         if !extensions.is_empty() {
             out.insert("extensions".into(), Value::Object(extensions));
         }
-        let mut extras = extras::material(layer.whole);
+        let mut extras = extras::material(layer.whole, &self.source.finish(layer.whole));
         if let (Value::Object(extras), false) = (&mut extras, look.lost.is_empty()) {
             extras.insert("lost".into(), json!(look.lost));
         }
@@ -211,6 +222,33 @@ impl Maker<'_> {
     fn put(&mut self, extensions: &mut Map<String, Value>, name: &'static str, value: Value) {
         self.extensions.insert(name);
         extensions.insert(name.to_owned(), value);
+    }
+
+    /// Reflectance of the part that is no metal.
+    fn reflectance(
+        &mut self,
+        material: &WorldMaterial,
+        reflection: &Reflection,
+        extensions: &mut Map<String, Value>,
+    ) -> Result<(), ExportError> {
+        let Some(reflectance) = reflection.reflectance else {
+            for (name, value) in diffuse() {
+                self.put(extensions, name, value);
+            }
+            return Ok(());
+        };
+        let mut specular = Map::new();
+        let factor = reflectance / USUAL_REFLECTANCE;
+        if factor != Vec3::ONE {
+            specular.insert("specularColorFactor".into(), json!(factor.to_array()));
+        }
+        if let Some(texture) = self.map(material, &reflection.specular)? {
+            specular.insert("specularColorTexture".into(), texture);
+        }
+        if !specular.is_empty() {
+            self.put(extensions, "KHR_materials_specular", json!(specular));
+        }
+        Ok(())
     }
 
     fn dielectric(&mut self, look: &Look, extensions: &mut Map<String, Value>) {
@@ -239,6 +277,15 @@ impl Maker<'_> {
                 }),
             );
         }
+    }
+
+    /// The reference to the texture of a map of reflection, which does not move.
+    fn map(
+        &mut self,
+        material: &WorldMaterial,
+        slot: &Option<Slot>,
+    ) -> Result<Option<Value>, ExportError> {
+        self.texture(material, slot.as_ref(), "")
     }
 
     /// The reference to a slot's texture, at `place` in the document; `None` when there is no such image.
@@ -297,6 +344,15 @@ impl Maker<'_> {
         }
         Ok(Some(reference))
     }
+}
+
+/// Extensions of a material that is diffuse alone. Without them programs add the reflection of an index of refraction
+/// of 1.5. Blender before 4.0 ignores `specularFactor`, and the index where there is no `KHR_materials_specular`.
+pub fn diffuse() -> BTreeMap<&'static str, Value> {
+    BTreeMap::from([
+        ("KHR_materials_ior", json!({"ior": 1.0})),
+        ("KHR_materials_specular", json!({"specularFactor": 0.0})),
+    ])
 }
 
 /// A matrix of texture coordinates as a rotation and scales, the form of glTF: rotation · scale. `None` for others.

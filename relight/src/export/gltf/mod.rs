@@ -225,8 +225,8 @@ impl Document<'_> {
                 radiance,
                 ..lighting
             };
-            let (mut look, shaded) = look_in(self.source, &layer.material, lighting);
-            let pulse = make_moving(self.source, &layer.material, lighting, &mut look, bounds);
+            let (mut look, shaded) = look_in(self.source, &layer, lighting);
+            let pulse = make_moving(self.source, &layer, lighting, &mut look, bounds);
             layer.weigh(self.source, &mut look);
             let number = self.add_material(&layer, &look, pulse.as_ref())?;
             let name = &layer.material.name;

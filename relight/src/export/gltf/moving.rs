@@ -3,11 +3,11 @@
 use super::pulse::Pulse;
 use crate::export::Export;
 use crate::export::film::Film;
+use crate::export::layers::Layer;
 use crate::export::look::{Look, Picture, Slot};
 use crate::export::losses::{FILM, PULSE, WOBBLE};
 use crate::export::shown::{glows, make_shown_as};
 use crate::export::stack::Moment;
-use crate::world::WorldMaterial;
 use glam::{Vec2, Vec3};
 use shaderscript::{AlphaGen, RgbGen, Shader, Stage, StageImage, TcMod};
 
@@ -20,10 +20,10 @@ pub struct Lighting {
     pub shown: Option<Vec3>,
 }
 
-/// What other programs can say of a material, and whether light in colours of vertices multiplies it.
-pub fn look_in(source: &Export<'_>, material: &WorldMaterial, lighting: Lighting) -> (Look, bool) {
-    let clear = lighting.shown.is_none();
-    let mut look = source.look(material, lighting.radiance, clear, Moment::Mean);
+/// What other programs can say of a layer, and whether light in colours of vertices multiplies it.
+pub fn look_in(source: &Export<'_>, layer: &Layer<'_>, lighting: Lighting) -> (Look, bool) {
+    let lit = lighting.shown.is_none();
+    let mut look = source.look(layer, lighting.radiance, lit, Moment::Mean);
     let shaded = match lighting.shown {
         Some(light) => {
             let glows = glows(&look);
@@ -34,11 +34,11 @@ pub fn look_in(source: &Export<'_>, material: &WorldMaterial, lighting: Lighting
     (look, shaded)
 }
 
-/// Animates a material's pictures, and returns how its colours change. `bounds`: least and largest texture
+/// Animates a layer's pictures, and returns how its colours change. `bounds`: least and largest texture
 /// coordinates of its surfaces, where they are known.
 pub fn make_moving(
     source: &Export<'_>,
-    material: &WorldMaterial,
+    layer: &Layer<'_>,
     lighting: Lighting,
     look: &mut Look,
     bounds: Option<(Vec2, Vec2)>,
@@ -46,7 +46,7 @@ pub fn make_moving(
     if !source.options.animate {
         return None;
     }
-    let shader = &material.resolved.shader;
+    let shader = &layer.material.resolved.shader;
     for slot in [&mut look.color, &mut look.glow].into_iter().flatten() {
         let film = bounds.and_then(|bounds| Film::of(slot, shader, bounds));
         let Some(film) = film else {
@@ -60,10 +60,10 @@ pub fn make_moving(
             slot.picture = picture;
         }
     }
-    let clear = lighting.shown.is_none();
-    let usual = source.look(material, lighting.radiance, clear, Moment::Mean);
+    let lit = lighting.shown.is_none();
+    let usual = source.look(layer, lighting.radiance, lit, Moment::Mean);
     let pulse = Pulse::of(shader, &mut |moment| {
-        let mut now = source.look(material, lighting.radiance, clear, moment);
+        let mut now = source.look(layer, lighting.radiance, lit, moment);
         if let Some(light) = lighting.shown {
             make_shown_as(&mut now, light, glows(&usual));
         }

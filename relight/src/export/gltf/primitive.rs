@@ -29,12 +29,13 @@ pub fn primitive(
     let normals = vertices
         .iter()
         .map(|v| (turn(v.normal) * side).normalize_or(Vec3::Y).to_array());
+    // Without TANGENT, readers derive MikkTSpace's tangents of normal maps from what is there, as the traced look does.
     let mut attributes = json!({
         "POSITION": position,
         "NORMAL": buffers.add_floats(Kind::Vec3, normals),
     });
     if let Value::Object(map) = &mut attributes {
-        if look.color.is_some() || look.glow.is_some() {
+        if look.has_pictures() {
             let st = buffers.add_floats(Kind::Vec2, vertices.iter().map(|v| v.st.to_array()));
             map.insert("TEXCOORD_0".into(), json!(st));
         }

@@ -2,7 +2,7 @@
 
 use super::Document;
 use super::buffer::{Buffers, Kind};
-use super::materials::Sampling;
+use super::materials::{Sampling, diffuse};
 use super::nodes::turn;
 use crate::export::geometry::Geometry;
 use crate::export::images::Encoded;
@@ -82,11 +82,11 @@ impl Document<'_> {
                         true => material.name.clone(),
                         false => format!("{} side {side}", material.name),
                     };
-                    self.sky_material(&name, image, strength)
+                    self.sky_material(&name, Some(image), Vec3::splat(strength))
                 }
                 None => *plain.get_or_insert_with(|| {
                     let color = radiance.filter(|_| shown.is_none()).unwrap_or(Vec3::ZERO);
-                    self.plain_sky(&material.name, color)
+                    self.sky_material(&material.name, None, color)
                 }),
             };
             let scale = source.options.scale;
@@ -105,7 +105,7 @@ impl Document<'_> {
         self.meshes
             .push(json!({"name": "sky", "primitives": primitives}));
         let mesh = self.meshes.len() - 1;
-        let extras = extras::material(material);
+        let extras = extras::material(material, &self.source.finish(material));
         Ok(Some(self.nodes.add(json!({
             "name": "sky",
             "mesh": mesh,
@@ -113,48 +113,27 @@ impl Document<'_> {
         }))))
     }
 
-    fn sky_material(&mut self, name: &str, image: &Arc<Encoded>, strength: f32) -> usize {
-        let texture = self.textures.add(image, Sampling::Clamp);
-        let mut material = json!({
-            "name": name,
-            "pbrMetallicRoughness": {
-                "baseColorFactor": [0.0, 0.0, 0.0, 1.0],
-                "metallicFactor": 0.0,
-            },
-            "emissiveTexture": {"index": texture},
-            "emissiveFactor": Vec3::splat(strength.min(1.0)).to_array(),
-        });
-        if strength > 1.0
-            && let Value::Object(map) = &mut material
-        {
-            self.extensions.insert("KHR_materials_emissive_strength");
-            map.insert(
-                "extensions".into(),
-                json!({"KHR_materials_emissive_strength": {"emissiveStrength": strength}}),
-            );
+    /// A material that shines with a radiance, times a picture if it has one, and reflects nothing.
+    fn sky_material(&mut self, name: &str, image: Option<&Arc<Encoded>>, radiance: Vec3) -> usize {
+        let brightest = radiance.max_element().max(1.0);
+        let mut extensions = diffuse();
+        if brightest > 1.0 {
+            let strength = json!({"emissiveStrength": brightest});
+            extensions.insert("KHR_materials_emissive_strength", strength);
         }
-        self.materials.push(material);
-        self.materials.len() - 1
-    }
-
-    fn plain_sky(&mut self, name: &str, color: Vec3) -> usize {
-        let brightest = color.max_element().max(1.0);
+        self.extensions.extend(extensions.keys());
         let mut material = json!({
             "name": name,
             "pbrMetallicRoughness": {
                 "baseColorFactor": [0.0, 0.0, 0.0, 1.0],
                 "metallicFactor": 0.0,
             },
-            "emissiveFactor": (color / brightest).to_array(),
+            "emissiveFactor": (radiance / brightest).to_array(),
+            "extensions": extensions,
         });
-        if brightest > 1.0
-            && let Value::Object(map) = &mut material
-        {
-            self.extensions.insert("KHR_materials_emissive_strength");
-            map.insert(
-                "extensions".into(),
-                json!({"KHR_materials_emissive_strength": {"emissiveStrength": brightest}}),
-            );
+        if let Some(image) = image {
+            let texture = self.textures.add(image, Sampling::Clamp);
+            material["emissiveTexture"] = json!({"index": texture});
         }
         self.materials.push(material);
         self.materials.len() - 1

@@ -7,7 +7,8 @@
 use super::extras;
 use super::{Export, ExportError, ExportReport, Output};
 use crate::emitters::{PointLight, SunLight, TriangleLight};
-use crate::world::RelitWorld;
+use crate::materials::finish::Finish;
+use crate::world::{RelitWorld, WorldMaterial};
 use glam::Vec3;
 use q3bsp::Bsp;
 use serde::{Deserialize, Serialize};
@@ -46,7 +47,8 @@ pub enum JsonError {
 /// # Errors
 /// [`ExportError::Write`].
 pub(super) fn write(source: &Export<'_>, output: &mut Output) -> Result<ExportReport, ExportError> {
-    let document = document(source.world).map_err(|problem| ExportError::Write {
+    let finish = |material: &WorldMaterial| source.finish(material);
+    let document = document(source.world, &finish).map_err(|problem| ExportError::Write {
         path: output.main().to_owned(),
         source: problem.into(),
     })?;
@@ -188,11 +190,14 @@ impl Formatter for Layout {
     }
 }
 
-/// The document of a map.
+/// The document of a map. `finish`: what is stated about the reflection of a material.
 ///
 /// # Errors
 /// None but bugs: the document is written to memory.
-pub fn document(world: &RelitWorld) -> Result<Vec<u8>, serde_json::Error> {
+pub fn document(
+    world: &RelitWorld,
+    finish: &dyn Fn(&WorldMaterial) -> Finish,
+) -> Result<Vec<u8>, serde_json::Error> {
     let entities = world.bsp.entities().into_iter();
     let mut document = Vec::new();
     Document {
@@ -201,7 +206,9 @@ pub fn document(world: &RelitWorld) -> Result<Vec<u8>, serde_json::Error> {
         name: &world.name,
         map: &world.bsp,
         entities: entities.map(|entity| entity.pairs).collect(),
-        materials: world.materials.iter().map(extras::material).collect(),
+        materials: (world.materials.iter())
+            .map(|material| extras::material(material, &finish(material)))
+            .collect(),
         surface_materials: world.surfaces.iter().map(|s| s.material).collect(),
         lights: Lights {
             triangles: &world.lights,

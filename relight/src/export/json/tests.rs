@@ -34,7 +34,7 @@ fn map() -> Bsp {
 }
 
 fn read_back(bsp: Bsp) -> Result<Bsp, JsonError> {
-    read_map(&document(&world(bsp)).unwrap())
+    read_map(&document(&world(bsp), &|_| Finish::default()).unwrap())
 }
 
 /// Whether everything in two maps is the same, numbers that are none included.
@@ -80,7 +80,8 @@ fn repaired_values_are_written_as_they_were() {
 
 #[test]
 fn what_was_found_is_told() {
-    let document: Value = serde_json::from_slice(&document(&world(map())).unwrap()).unwrap();
+    let document: Value =
+        serde_json::from_slice(&document(&world(map()), &|_| Finish::default()).unwrap()).unwrap();
     assert_eq!(document["schema"], SCHEMA);
     assert_eq!(document["entities"][1][0][1], "light");
     assert_eq!(document["lights"]["points"][0]["origin"][2], 8.0);
@@ -95,7 +96,7 @@ fn what_was_found_is_told() {
 
 #[test]
 fn what_is_no_such_document_is_refused_with_its_place() {
-    let good = String::from_utf8(document(&world(map())).unwrap()).unwrap();
+    let good = String::from_utf8(document(&world(map()), &|_| Finish::default()).unwrap()).unwrap();
     for (from, to, part) in [
         ("\"relight-map\"", "\"other\"", "schema"),
         ("\"version\":1", "\"version\":2", "version 2, not 1"),
@@ -256,7 +257,9 @@ fn documents_are_what_the_schema_says() {
     layered.format = Format::Rbsp;
     let layered = Bsp::parse(&layered.write()).unwrap();
     for bsp in [map(), layered] {
-        let document: Value = serde_json::from_slice(&document(&world(bsp)).unwrap()).unwrap();
+        let document: Value =
+            serde_json::from_slice(&document(&world(bsp), &|_| Finish::default()).unwrap())
+                .unwrap();
         conforms(&document, &schema, &schema, "");
     }
 }
