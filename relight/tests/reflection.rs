@@ -9,9 +9,9 @@ use relight::{Materials, MemoryFiles, Options, RelitWorld};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-const NAMES: [&str; 14] = [
+const NAMES: [&str; 16] = [
     "bare", "rough", "dull", "metal", "mirror", "faint", "glass", "beside", "surface", "scaled",
-    "grey", "missing", "plain", "grate",
+    "grey", "missing", "plain", "grate", "frosted", "lamp",
 ];
 
 const LINES: &str = "
@@ -29,6 +29,10 @@ rough t/missing 0.75
 plain t/plain
 normals t/grate t/beside_n
 metal t/grate 0.5
+glass t/frosted 1.5 1 1 1
+rough t/frosted 0.3
+glow t/lamp t/lit 6
+glow t/rough t/nothing
 ";
 
 const SCRIPT: &str = "
@@ -75,6 +79,7 @@ fn write(format: Format, options: ExportOptions) -> Written {
     image("beside_n", [166, 77, 239, 255]);
     image("beside_s", [188, 188, 188, 204]);
     image("grey_n", [128, 128, 128, 255]);
+    image("lit", [188, 188, 0, 255]);
     image("packed", [255, 128, 64, 255]);
     let mut map = MapBuilder::new();
     for (i, name) in NAMES.iter().enumerate() {
@@ -189,6 +194,15 @@ fn gltf_has_what_is_stated() {
     assert_eq!(base("glass", "baseColorTexture"), &Value::Null);
     assert_eq!(found["glass"]["alphaMode"], Value::Null);
 
+    near(base("frosted", "roughnessFactor"), &[0.3]);
+    let strength = extension("lamp", "KHR_materials_emissive_strength");
+    near(
+        &strength["emissiveStrength"],
+        &[6.0 * stored["asset"]["extras"]["exposure"].as_f64().unwrap()],
+    );
+    near(&found["lamp"]["emissiveFactor"], &[1.0; 3]);
+    assert_eq!(texel(&found["lamp"]["emissiveTexture"]), [188, 188, 0]);
+
     // a map of reflectance: its smoothness of 204 is a roughness of 51
     near(base("beside", "roughnessFactor"), &[1.0]);
     near(base("beside", "metallicFactor"), &[0.0]);
@@ -226,9 +240,10 @@ fn gltf_has_what_is_stated() {
     };
     about("grey", "t/grey_n is no normal map");
     about("missing", "the map of roughness t/nothing is missing");
+    about("rough", "the image t/nothing of what glows is missing");
     about("faint", "mirrors 0.1 0.2 0.1 of the light; left out");
     about("plain", "a picture of the surroundings; left out");
-    assert_eq!(warnings.len(), 4, "{warnings:?}");
+    assert_eq!(warnings.len(), 5, "{warnings:?}");
     for name in [
         "KHR_materials_ior",
         "KHR_materials_specular",

@@ -5,7 +5,7 @@ use super::look::{Alpha, Dielectric, Look, Picture, SURROUNDINGS, Slot};
 use super::{Export, ImagePlace};
 use crate::files::GameFiles;
 use crate::image::Image;
-use crate::materials::finish::{Finish, NormalMap, SurfaceMap, USUAL_REFLECTANCE};
+use crate::materials::finish::{Finish, MapFault, NormalMap, SurfaceMap, USUAL_REFLECTANCE};
 use crate::materials::light::SurfaceClass;
 use crate::overbright;
 use crate::world::WorldMaterial;
@@ -186,12 +186,22 @@ impl Export<'_> {
             }
         }
         if let Some((index, part)) = finish.glass {
-            make_glass(index, part, look);
+            make_glass(index, part, finish.roughness.unwrap_or(0.0), look);
         } else if !class.translucent {
             self.add_gloss(layer.whole, finish.clone(), look);
         }
         if let Some(mirror) = finish.mirror {
             make_mirror(mirror, look);
+        }
+        if let Some(glow) = &finish.glow {
+            let picture = Picture::File(glow.image.clone());
+            if self.mean(layer.whole, &picture).is_some() {
+                look.glow = Some(Slot::plain(picture));
+                look.glow_factor = Vec3::splat(glow.radiance);
+            } else if self.options.images != ImagePlace::None {
+                look.lost
+                    .push(MapFault::NoGlow(glow.image.clone()).to_string());
+            }
         }
     }
 
@@ -236,14 +246,14 @@ impl Export<'_> {
     }
 }
 
-/// Clear glass in place of what the stages show.
-fn make_glass(index: f32, part: Vec3, look: &mut Look) {
+/// Glass in place of what the stages show, frosted if it is rough.
+fn make_glass(index: f32, part: Vec3, roughness: f32, look: &mut Look) {
     look.dielectric = Some(Dielectric {
         index,
         transmission: 1.0,
         liquid: None,
     });
-    look.reflection = Reflection::usual(0.0);
+    look.reflection = Reflection::usual(roughness);
     make_plain(part, look);
     (look.glow, look.glow_factor) = (None, Vec3::ZERO);
     look.lost.retain(|line| !line.starts_with("stage "));

@@ -24,6 +24,9 @@ pub enum MapFault {
     /// The normal map cannot be loaded.
     #[error("the normal map {0} is missing or unreadable; the surface stays without it")]
     NoNormals(String),
+    /// The image of what glows cannot be loaded.
+    #[error("the image {0} of what glows is missing or unreadable; the surface stays without it")]
+    NoGlow(String),
     /// The image is something else. One of a single channel is grey.
     #[error("{0} is no normal map: its mean colour is not blue; the surface stays without it")]
     NotNormals(String),

@@ -2,7 +2,7 @@
 //! decide about its reflection.
 
 use relight::materials::by_hand::MaterialsByHand;
-use relight::materials::finish::Finish;
+use relight::materials::finish::{Finish, MapFault};
 use shaders::types::{Dielectric, Specular, constants as c};
 
 use super::compile::sampler;
@@ -156,10 +156,10 @@ fn apply(
                 specular.glow_radiance = glow.radiance;
                 specular.sampler_index = sampler::REPEAT_MIP;
             }
-            None => faults.push(format!(
-                "material {}: the image {} of what glows is missing or unreadable; the surface stays without it",
-                material.name, glow.image
-            )),
+            None => {
+                let fault = MapFault::NoGlow(glow.image.clone());
+                faults.push(format!("material {}: {fault}", material.name));
+            }
         }
     }
     if let Some(mirror) = finish.mirror.filter(|_| has_body(flags)) {
