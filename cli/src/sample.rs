@@ -21,7 +21,7 @@ pub struct SampleArgs {
     #[arg(default_value = "hall", value_parser = parse_sample)]
     name: Sample,
     /// The pack, a new .pk3 file
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
 }
 
