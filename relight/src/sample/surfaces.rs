@@ -139,7 +139,7 @@ fn add_entities(map: &mut MapBuilder) {
         ("info_player_deathmatch", "0 -150 24", "0 90 0"),
         ("info_player_deathmatch", "-240 -150 24", "0 45 0"),
         ("info_player_deathmatch", "240 -150 24", "0 135 0"),
-        ("info_player_deathmatch", "0 204 24", "0 270 0"),
+        ("info_player_deathmatch", "0 -90 24", "0 90 0"),
     ] {
         map.add_entity(&[("classname", class), ("origin", origin), ("angles", angles)]);
     }
