@@ -129,6 +129,22 @@ impl Materials {
         self.with_mtr.as_ref().unwrap_or(&self.library)
     }
 
+    /// Faults of the definition of a name in an `.mtr` file.
+    pub fn mtr_faults(&self, name: &str) -> impl Iterator<Item = &Diagnostic> {
+        let library = self.with_mtr.as_ref();
+        let found = library.and_then(|library| library.find(name));
+        let of = move |fault: &&Diagnostic| {
+            found.is_some_and(|shader| {
+                fault.file.ends_with(".mtr")
+                    && fault.file == shader.location.file
+                    && fault.shader.as_deref() == Some(shader.name.as_str())
+                    && fault.severity != shaderscript::Severity::Note
+            })
+        };
+        let all = library.map_or(&[][..], Library::diagnostics);
+        all.iter().filter(of)
+    }
+
     /// The material of a name, for a kind of use.
     ///
     /// As in the engine: a script's definition if there is one, all images of its stages exist, and the engine

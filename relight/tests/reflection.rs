@@ -240,7 +240,7 @@ fn gltf_has_what_is_stated() {
     };
     about("grey", "t/grey_n is no normal map");
     about("missing", "the map of roughness t/nothing is missing");
-    about("rough", "the image t/nothing of what glows is missing");
+    about("rough", "the emissive map t/nothing is missing");
     about("faint", "mirrors 0.1 0.2 0.1 of the light; left out");
     about("plain", "a picture of the surroundings; left out");
     assert_eq!(warnings.len(), 5, "{warnings:?}");

@@ -1,6 +1,6 @@
 //! What formats of other programs have no words for, as JSON: whole materials, entities with all their keys.
 
-use crate::materials::finish::{Finish, NormalMap, SurfaceMap};
+use crate::materials::finish::{Finish, Glow, NormalMap, SurfaceMap};
 use crate::world::{StyleLight, StyleStrength, WorldMaterial};
 use glam::{Vec2, Vec3};
 use q3bsp::Entity;
@@ -62,6 +62,8 @@ fn reflection(finish: &Finish) -> Map<String, Value> {
     put("normals", finish.normals.as_ref().map(normals));
     let surface = |map: &SurfaceMap| json!(map.to_string());
     put("surface", finish.surface.as_ref().map(surface));
+    let glow = |g: &Glow| json!({"image": g.image, "radiance": g.radiance});
+    put("glow", finish.glow.as_ref().map(glow));
     put("plain", finish.plain.then_some(Value::Bool(true)));
     map
 }

@@ -246,7 +246,7 @@ impl Export<'_> {
     }
 }
 
-/// Glass in place of what the stages show, frosted if it is rough.
+/// Replaces what the stages show by glass, which is frosted where its roughness is above 0.
 fn make_glass(index: f32, part: Vec3, roughness: f32, look: &mut Look) {
     look.dielectric = Some(Dielectric {
         index,

@@ -83,7 +83,8 @@ impl MaterialsByHand {
         wrong
     }
 
-    /// Reads `materials/*.mat`, `scripts/*.materials`, and the files of both kinds beside a map. Returns what is wrong with them, one line each.
+    /// Reads `materials/*.mat`, `scripts/*.materials`, and the files of both kinds beside a map. Returns what is wrong with
+    /// them, one line each.
     pub fn load(files: &dyn GameFiles, map: &str) -> (MaterialsByHand, Vec<String>) {
         let mut all = MaterialsByHand::default();
         let mut faults = Vec::new();
@@ -126,9 +127,8 @@ impl MaterialsByHand {
         for rule in self.rules.iter().filter(|r| matches(&r.pattern, name)) {
             match &rule.statement {
                 Statement::Rough(roughness, reflectance) => {
-                    if finish.surface == of_pack {
-                        finish.surface = None;
-                        finish.reflectance = None;
+                    if finish.surface.is_some() && finish.surface == of_pack {
+                        finish.forget_gloss();
                     }
                     finish.roughness = Some(*roughness);
                     finish.reflectance = reflectance.map(Vec3::splat).or(finish.reflectance);
@@ -151,6 +151,9 @@ impl MaterialsByHand {
                     });
                 }
                 Statement::Surface(image) => {
+                    if finish.surface.is_some() && finish.surface == of_pack {
+                        finish.forget_gloss();
+                    }
                     finish.surface = Some(SurfaceMap::RoughnessMetal(image.clone()));
                 }
                 Statement::Plain => {
@@ -387,10 +390,26 @@ mod tests {
             (rough.surface, rough.reflectance, rough.roughness),
             (None, None, Some(0.2))
         );
-        assert_eq!(rough.metal, Some(0.5));
+        assert_eq!(rough.metal, None, "a factor of the map");
+        let (file, _) = MaterialsByHand::parse("surface a own\nrough b 0.2 0.1\nrough b 0.3");
+        let own = file.finish("a", &of_pack("m"));
+        assert_eq!(
+            own.surface,
+            Some(SurfaceMap::RoughnessMetal("own".to_owned()))
+        );
+        assert_eq!(
+            (own.roughness, own.reflectance, own.metal),
+            (None, None, None)
+        );
+        // a later line keeps what it does not state
+        let twice = file.finish("b", &Finish::default());
+        assert_eq!(
+            (twice.roughness, twice.reflectance),
+            (Some(0.3), Some(Vec3::splat(0.1)))
+        );
         let of_mat = all.finish("d", &of_pack("m"));
         assert_eq!(of_mat.roughness, Some(0.7));
-        assert_eq!(of_mat.surface, map("m"));
+        assert_eq!((of_mat.surface, of_mat.metal), (None, None));
         let unmatched = all.unmatched("maps/x.bsp", &["ab", "c"]);
         assert_eq!(
             unmatched,

@@ -24,8 +24,8 @@ pub enum MapFault {
     /// The normal map cannot be loaded.
     #[error("the normal map {0} is missing or unreadable; the surface stays without it")]
     NoNormals(String),
-    /// The image of what glows cannot be loaded.
-    #[error("the image {0} of what glows is missing or unreadable; the surface stays without it")]
+    /// The emissive map cannot be loaded.
+    #[error("the emissive map {0} is missing or unreadable; the surface stays without it")]
     NoGlow(String),
     /// The image is something else. One of a single channel is grey.
     #[error("{0} is no normal map: its mean colour is not blue; the surface stays without it")]
@@ -47,7 +47,7 @@ pub struct Finish {
     pub glass: Option<(f32, Vec3)>,
     /// Value and colour of emitted light; the largest channel of the colour is 1.
     pub emission: Option<(f32, Vec3)>,
-    /// Image of what shines.
+    /// Emissive map.
     pub glow: Option<Glow>,
     /// Normal map.
     pub normals: Option<NormalMap>,
@@ -57,7 +57,7 @@ pub struct Finish {
     pub plain: bool,
 }
 
-/// An image, display-encoded, of what of a surface shines.
+/// An emissive map: the colour that each point of a surface emits, display-encoded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Glow {
     /// Its name.
@@ -111,13 +111,13 @@ impl Finish {
         self.metal.unwrap_or(usual)
     }
 
-    /// Leaves out the map of roughness, metal or reflectance. Factors of a map of reflectance go with it: they mean
-    /// nothing alone.
+    /// Leaves out the map of roughness, metal or reflectance. The numbers of a pack go with it, because they are factors
+    /// of the map; those of lines by hand have a meaning of their own.
     pub fn without_surface(&self) -> Finish {
         let mut finish = self.clone();
-        if (finish.surface.take()).is_some_and(|map| map.is_specular()) {
-            finish.roughness = None;
-            finish.reflectance = None;
+        match finish.surface.take() {
+            None | Some(SurfaceMap::RoughnessMetal(_)) => {}
+            Some(_) => finish.forget_gloss(),
         }
         finish
     }
@@ -152,6 +152,11 @@ impl Finish {
         }
     }
 
+    /// Forgets roughness, metal and reflectance: the numbers are factors of the map.
+    pub(super) fn forget_gloss(&mut self) {
+        (self.roughness, self.reflectance, self.metal, self.surface) = (None, None, None, None);
+    }
+
     /// What another states replaces what this one states.
     pub(super) fn overlay(&mut self, other: &Finish) {
         let Finish {
@@ -166,6 +171,9 @@ impl Finish {
             surface,
             plain,
         } = other.clone();
+        if other.is_rough() {
+            self.forget_gloss();
+        }
         self.roughness = roughness.or(self.roughness);
         self.reflectance = reflectance.or(self.reflectance);
         self.metal = metal.or(self.metal);
@@ -185,7 +193,12 @@ pub enum SurfaceMap {
     /// Roughness in green and metal in blue, as in glTF.
     RoughnessMetal(String),
     /// Smoothness in red and metal in green: `specularMap` of `opengl2` with `r_pbr 1`.
-    SmoothnessMetal(String),
+    SmoothnessMetal {
+        /// The image.
+        image: String,
+        /// Factor of its smoothness, in 255ths.
+        scale: u8,
+    },
     /// Colour of the reflection, display-encoded, and smoothness in alpha: `specularMap` of `opengl2`.
     Specular(String),
     /// Roughness and metal in the alpha of two images: `.mat` files of Quake II RTX.
@@ -201,7 +214,12 @@ impl fmt::Display for SurfaceMap {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             SurfaceMap::RoughnessMetal(image) => write!(f, "{image}"),
-            SurfaceMap::SmoothnessMetal(image) => write!(f, "{image} (smoothness and metal)"),
+            SurfaceMap::SmoothnessMetal { image, scale: 255 } => {
+                write!(f, "{image} (smoothness and metal)")
+            }
+            SurfaceMap::SmoothnessMetal { image, scale } => {
+                write!(f, "{image} (smoothness times {scale}/255, and metal)")
+            }
             SurfaceMap::Specular(image) => write!(f, "{image} (reflectance and smoothness)"),
             SurfaceMap::Alphas {
                 roughness: None,
@@ -225,7 +243,7 @@ impl SurfaceMap {
     pub fn image(&self) -> &str {
         match self {
             SurfaceMap::RoughnessMetal(image)
-            | SurfaceMap::SmoothnessMetal(image)
+            | SurfaceMap::SmoothnessMetal { image, .. }
             | SurfaceMap::Specular(image)
             | SurfaceMap::Alphas { metal: image, .. } => image,
         }
@@ -238,7 +256,7 @@ impl SurfaceMap {
     /// An image cannot be read.
     pub fn load(&self, files: &dyn GameFiles) -> Result<Option<Image>, ImageError> {
         let image = |name: &str| Ok::<_, ImageError>(image::load(files, name)?.map(|(i, _)| i));
-        let each = |mut image: Image, texel: fn([u8; 4]) -> [u8; 4]| {
+        let each = |mut image: Image, texel: &dyn Fn([u8; 4]) -> [u8; 4]| {
             for pixel in image.rgba.as_chunks_mut().0 {
                 *pixel = texel(*pixel);
             }
@@ -246,8 +264,10 @@ impl SurfaceMap {
         };
         Ok(match self {
             SurfaceMap::RoughnessMetal(name) | SurfaceMap::Specular(name) => image(name)?,
-            SurfaceMap::SmoothnessMetal(name) => {
-                image(name)?.map(|i| each(i, |[r, g, _, _]| [255, 255 - r, g, 255]))
+            SurfaceMap::SmoothnessMetal { image: name, scale } => {
+                let scale = u32::from(*scale);
+                let rough = |smooth: u8| 255 - ((u32::from(smooth) * scale + 127) / 255) as u8;
+                image(name)?.map(|i| each(i, &|[r, g, _, _]| [255, rough(r), g, 255]))
             }
             SurfaceMap::Alphas { roughness, metal } => {
                 let metal = image(metal)?;
@@ -310,8 +330,11 @@ mod tests {
         let stored = Some(vec![10, 20, 30, 40]);
         assert_eq!(load(SurfaceMap::RoughnessMetal(name())), stored);
         assert_eq!(load(SurfaceMap::Specular(name())), stored);
-        let smooth = load(SurfaceMap::SmoothnessMetal(name()));
-        assert_eq!(smooth, Some(vec![255, 245, 20, 255]));
+        for (scale, rough) in [(255, 245), (51, 253)] {
+            let image = name();
+            let smooth = load(SurfaceMap::SmoothnessMetal { image, scale });
+            assert_eq!(smooth, Some(vec![255, rough, 20, 255]));
+        }
         let alphas = |roughness: Option<&str>, metal: &str| SurfaceMap::Alphas {
             roughness: roughness.map(str::to_owned),
             metal: metal.to_owned(),

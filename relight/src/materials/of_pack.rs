@@ -26,6 +26,7 @@ impl Materials {
         let stated = self
             .reflections()
             .find(name)
+            .filter(|shader| shader.rejected.is_none())
             .map(|shader| &shader.reflection);
         let normals = stated.and_then(|r| r.normals.clone());
         let specular = stated.and_then(|r| r.specular.clone());
@@ -106,10 +107,9 @@ fn of_stage(specular: &SpecularStage, finish: &mut Finish) {
     };
     let smoothness = specular.smoothness.unwrap_or(1.0);
     if specular.metallic {
-        finish.surface = Some(SurfaceMap::SmoothnessMetal(image));
+        let scale = (unit(smoothness) * 255.0).round() as u8;
+        finish.surface = Some(SurfaceMap::SmoothnessMetal { image, scale });
         finish.metal = specular.metal.map(unit);
-        // roughness is a factor of the map's here
-        finish.roughness = specular.smoothness.map(|s| unit(1.0 - s));
     } else {
         finish.surface = Some(SurfaceMap::Specular(image));
         finish.reflectance = specular.reflectance.map(units);
@@ -200,5 +200,16 @@ mod tests {
         assert_eq!(m.surface, Some(SurfaceMap::Specular("t/m_m".to_owned())));
         assert_eq!(m.reflectance, Some(Vec3::new(0.5, 0.6, 0.7)));
         assert_eq!(m.roughness, Some(0.75));
+        // a definition with a fault states nothing, and is reported
+        let wrong = "t/a\n{\n{\nmap t/a\nroughness 0.5\nrouhgness 0.5\n}\n}\nt/b\n{\n{\nmap t/b\nroughness\n}\n}\n";
+        let wrong = materials(&[("scripts/a.mtr", wrong), ("scripts/a.shader", plain)]);
+        assert_eq!(finish(&wrong, "t/a", &[]), Finish::default());
+        let fault = wrong.mtr_faults("T/a").next().unwrap().to_string();
+        assert!(
+            fault.starts_with("scripts/a.mtr:6:") && fault.contains("rouhgness"),
+            "{fault}"
+        );
+        assert_eq!(wrong.mtr_faults("t/b").count(), 1);
+        assert_eq!(wrong.mtr_faults("t/c").count(), 0);
     }
 }

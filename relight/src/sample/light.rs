@@ -25,6 +25,14 @@ const EVEN: Vec3 = Vec3::new(9.0, 9.0, 11.0);
 /// Distance of a ray's start from its surface: curves lie this far from their mesh at most.
 const CLEAR: f32 = 4.0;
 
+/// A point of the light grid before its light is computed.
+pub(super) const DARK: GridPoint = GridPoint {
+    ambient: [0; 3],
+    directed: [0; 3],
+    longitude: 0,
+    latitude: 0,
+};
+
 /// A small part of a lamp's surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lamp {

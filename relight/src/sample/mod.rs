@@ -15,11 +15,11 @@ mod windows;
 
 use glam::Vec3;
 use q3bsp::builder::MapBuilder;
-use q3bsp::{Bsp, GridPoint, ShaderId, content_flags, surface_flags};
+use q3bsp::{Bsp, ShaderId, content_flags, surface_flags};
 
 use crate::files::{FileError, MemoryFiles};
-use light::Lighting;
-use scene::Scene;
+use light::{DARK, Lighting};
+use scene::{Scene, add_places};
 
 /// A built-in sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -157,18 +157,19 @@ impl Shaders {
     }
 }
 
+/// Where the camera and the players begin.
+const PLACES: [(&str, &str, &str); 5] = [
+    ("info_player_intermission", "-432 -60 76", "-3 2 0"),
+    ("info_player_deathmatch", "-390 60 24", "0 -4 0"),
+    ("info_player_deathmatch", "380 -80 24", "0 165 0"),
+    ("info_player_deathmatch", "630 20 40", "0 181 0"),
+    ("info_player_deathmatch", "-330 210 24", "0 -25 0"),
+];
+
 /// Places for players and cameras, and the entity that makes a mirror of the mirror.
 fn add_entities(map: &mut MapBuilder) {
     map.set_world_key("message", "Relight sample");
-    for (class, origin, angles) in [
-        ("info_player_intermission", "-432 -60 76", "-3 2 0"),
-        ("info_player_deathmatch", "-390 60 24", "0 -4 0"),
-        ("info_player_deathmatch", "380 -80 24", "0 165 0"),
-        ("info_player_deathmatch", "630 20 40", "0 181 0"),
-        ("info_player_deathmatch", "-330 210 24", "0 -25 0"),
-    ] {
-        map.add_entity(&[("classname", class), ("origin", origin), ("angles", angles)]);
-    }
+    add_places(map, &PLACES);
     let (mirror, _) = furniture::MIRROR;
     let at = mirror + furniture::MIRROR_NORMAL * 4.0;
     let origin = format!("{} {} {}", at.x, at.y, at.z);
@@ -213,13 +214,7 @@ fn build_map() -> Bsp {
     }
     add_entities(&mut map);
     add_cells(&mut map);
-    let dark = GridPoint {
-        ambient: [0; 3],
-        directed: [0; 3],
-        longitude: 0,
-        latitude: 0,
-    };
-    let mut bsp = map.build_with_grid(GRID, |_| dark);
+    let mut bsp = map.build_with_grid(GRID, |_| DARK);
 
     let clear = shaders.clear();
     let stops: Vec<bool> = (bsp.surfaces.iter())

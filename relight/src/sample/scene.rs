@@ -19,6 +19,13 @@ const AROUND: usize = 64;
 const RINGS: usize = 32;
 const BAND: usize = 11;
 
+/// Adds entities of a class, at an origin and with angles.
+pub(super) fn add_places(map: &mut MapBuilder, places: &[(&str, &str, &str)]) {
+    for (class, origin, angles) in places {
+        map.add_entity(&[("classname", class), ("origin", origin), ("angles", angles)]);
+    }
+}
+
 /// Where a surface's light is stored: a rectangle of a page.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {

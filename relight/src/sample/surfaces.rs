@@ -3,12 +3,11 @@
 //! a map of roughness, and two panes are clear and frosted glass.
 
 use glam::{Vec2, Vec3};
-use q3bsp::builder::MapBuilder;
-use q3bsp::{Bsp, GridPoint, ShaderId, content_flags};
+use q3bsp::{Bsp, ShaderId, content_flags};
 
 use super::furniture::lamp;
-use super::light::Lighting;
-use super::scene::{Scene, face};
+use super::light::{DARK, Lighting};
+use super::scene::{Scene, add_places, face};
 use super::textures::{Recipe, Texel, fractal, grain, images_of};
 
 /// Game path of the map.
@@ -34,6 +33,15 @@ const METAL: (f32, f32) = (134.0, 66.0);
 /// Values and colours of the lamps, as in the script.
 const LAMP: (f32, Vec3) = (8000.0, Vec3::new(1.0, 0.96, 0.88));
 const WARM: (f32, Vec3) = (9000.0, Vec3::new(1.0, 0.72, 0.42));
+
+/// Where the camera and the players begin.
+const PLACES: [(&str, &str, &str); 5] = [
+    ("info_player_intermission", "0 -226 112", "10 90 0"),
+    ("info_player_deathmatch", "0 -150 24", "0 90 0"),
+    ("info_player_deathmatch", "-240 -150 24", "0 45 0"),
+    ("info_player_deathmatch", "240 -150 24", "0 135 0"),
+    ("info_player_deathmatch", "0 -90 24", "0 90 0"),
+];
 
 /// Distance of the points of the light grid.
 const GRID: Vec3 = Vec3::splat(64.0);
@@ -82,15 +90,10 @@ pub(super) fn build_map() -> Bsp {
     }
     scene.pack();
     let Scene { mut map, places } = scene;
-    add_entities(&mut map);
+    map.set_world_key("message", "Relight surfaces");
+    add_places(&mut map, &PLACES);
     map.add_cell((-ROOM).with_z(0.0), ROOM);
-    let dark = GridPoint {
-        ambient: [0; 3],
-        directed: [0; 3],
-        longitude: 0,
-        latitude: 0,
-    };
-    let mut bsp = map.build_with_grid(GRID, |_| dark);
+    let mut bsp = map.build_with_grid(GRID, |_| DARK);
     let passed = [clear, frosted, lamp_white, lamp_warm];
     let stops: Vec<bool> = (bsp.surfaces.iter())
         .map(|surface| !passed.contains(&surface.shader))
@@ -130,19 +133,6 @@ fn pane(scene: &mut Scene, shader: ShaderId, foot: Vec3) {
     let middle = foot + Vec3::Z * (tall + 6.0);
     let surface = scene.plate(shader, middle, Vec3::X * wide, Vec3::Z * tall, false);
     scene.whole_image(surface);
-}
-
-fn add_entities(map: &mut MapBuilder) {
-    map.set_world_key("message", "Relight surfaces");
-    for (class, origin, angles) in [
-        ("info_player_intermission", "0 -226 112", "10 90 0"),
-        ("info_player_deathmatch", "0 -150 24", "0 90 0"),
-        ("info_player_deathmatch", "-240 -150 24", "0 45 0"),
-        ("info_player_deathmatch", "240 -150 24", "0 135 0"),
-        ("info_player_deathmatch", "0 -90 24", "0 90 0"),
-    ] {
-        map.add_entity(&[("classname", class), ("origin", origin), ("angles", angles)]);
-    }
 }
 
 fn rgb(r: u8, g: u8, b: u8) -> Vec3 {

@@ -1,6 +1,7 @@
 //! Applies what packs and files of materials state (`relight::materials::finish`): it overrides what a material's stages
 //! decide about its reflection.
 
+use glam::Vec3;
 use relight::materials::by_hand::MaterialsByHand;
 use relight::materials::finish::{Finish, MapFault};
 use shaders::types::{Dielectric, Specular, constants as c};
@@ -51,12 +52,7 @@ impl Materials {
 
     /// Whether a rough material reflects more than [`LITTLE`] at normal incidence.
     pub fn has_metal(&self) -> bool {
-        let shines = |material: &Material| {
-            let specular = &material.specular;
-            let most = specular.metal.max(specular.reflectance.max_element());
-            material.flags & c::MATERIAL_ROUGH != 0 && most > LITTLE
-        };
-        self.list.iter().any(shines)
+        self.list.iter().any(|material| material.metallic)
     }
 
     /// Applies the files to a material. Returns what is wrong with its images.
@@ -69,6 +65,8 @@ impl Materials {
             let exists = |image: &str| source.exists(image);
             let of_pack = (self.scripts).of_pack(&material.name, &material.shader, &exists);
             let finish = by_hand.finish(&material.name, &of_pack);
+            let of_mtr = self.scripts.mtr_faults(&material.name);
+            faults.extend(of_mtr.map(ToString::to_string));
             apply(material, &finish, source, &mut faults);
         }
         faults
@@ -87,6 +85,7 @@ fn apply(
     faults: &mut Vec<String>,
 ) {
     let emitter = material.flags & c::MATERIAL_EMITTER;
+    material.metallic = false;
     let OfScript {
         mut flags,
         mut dielectric,
@@ -134,6 +133,12 @@ fn apply(
             specular.roughness = finish.roughness_or_usual();
             specular.reflectance = finish.reflectance_or_usual();
             specular.metal = finish.metal_or_usual();
+            // the numbers are factors of a map of reflectance
+            let map = (map.zip(finish.surface.as_ref()))
+                .filter(|(_, surface)| surface.is_specular())
+                .map_or(Vec3::ONE, |(map, _)| source.mean(map).truncate());
+            let most = (specular.reflectance * map).max_element();
+            material.metallic = specular.metal.max(most) > LITTLE;
         }
         if let (Some(surface), Some(map)) = (&finish.surface, map) {
             specular.map = map;

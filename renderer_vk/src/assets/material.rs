@@ -107,6 +107,8 @@ pub struct Material {
     pub of_script: OfScript,
     /// Transmission for rays.
     pub dielectric: Dielectric,
+    /// It is rough and reflects much at normal incidence.
+    pub metallic: bool,
     /// Specular reflection for rays.
     pub specular: Specular,
     /// Which faces are drawn.

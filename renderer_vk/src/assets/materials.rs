@@ -365,6 +365,7 @@ impl Materials {
             order,
             flags,
             dielectric,
+            metallic: false,
             specular: types::Specular::default(),
             cull: shader.cull,
             polygon_offset: shader.polygon_offset,

@@ -29,7 +29,7 @@ pub fn primitive(
     let normals = vertices
         .iter()
         .map(|v| (turn(v.normal) * side).normalize_or(Vec3::Y).to_array());
-    // Without TANGENT, readers derive MikkTSpace's tangents of normal maps from what is there, as the traced look does.
+    // Without TANGENT, readers compute MikkTSpace's tangents from normals and texture coordinates.
     let mut attributes = json!({
         "POSITION": position,
         "NORMAL": buffers.add_floats(Kind::Vec3, normals),
