@@ -132,7 +132,7 @@ pub struct Specular {
     pub map: u32,
     /// Bindless texture of normals in the tangent space of the texture coordinates. Of `MATERIAL_NORMALS` alone.
     pub normals: u32,
-    /// Bindless texture of what glows, display-encoded. Of `MATERIAL_GLOWS` alone.
+    /// Bindless emissive texture, display-encoded. Of `MATERIAL_GLOWS` alone.
     pub glow: u32,
     /// Radiance of the white of `glow`.
     pub glow_radiance: f32,

@@ -295,7 +295,7 @@ vec3 bounded_albedo(Material material, vec3 lit) {
     return material.lit_scale != 1.0 ? min(lit * material.lit_scale, max(lit, 1.0)) : lit;
 }
 
-// What the map of a glowing material shows, linear.
+// Emission by the material's emissive map, linear.
 vec3 glow_map(SurfacePoint p, Material material, Footprint footprint) {
     if ((material.flags & MATERIAL_GLOWS) == 0 || (VIEW.flags & VIEW_FULLBRIGHT) != 0) return vec3(0.0);
     Lookups lookups = Lookups(vec2(0.0), 1.0, texture_lod(material.specular.glow, p.texel_scale, footprint.width));

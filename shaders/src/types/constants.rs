@@ -116,7 +116,7 @@ pub const MATERIAL_NORMALS: u32 = 65536;
 pub const MATERIAL_PLAIN: u32 = 131072;
 /// Clear glass that a file of materials states: transmits its filter colour and shows none of its stages.
 pub const MATERIAL_CLEAR: u32 = 262144;
-/// It has a map of what glows.
+/// It has an emissive map.
 pub const MATERIAL_GLOWS: u32 = 1048576;
 /// Its map has reflectance and smoothness, not roughness and metal.
 pub const MATERIAL_SPECULAR_MAP: u32 = 524288;
