@@ -77,6 +77,17 @@ pub struct NormalMap {
     pub scale: Vec2,
 }
 
+impl NormalMap {
+    /// An image of normals whose y points down the image, as in Direct3D: `opengl2` and Quake II RTX apply it along the
+    /// texture coordinate t, which grows downwards.
+    pub fn downward(image: String, scale: Vec2) -> Self {
+        NormalMap {
+            image,
+            scale: Vec2::new(scale.x, -scale.y),
+        }
+    }
+}
+
 impl Finish {
     /// Whether the surface reflects by its roughness.
     pub fn is_rough(&self) -> bool {

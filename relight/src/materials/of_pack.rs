@@ -35,15 +35,10 @@ impl Materials {
             let name = format!("{}{suffix}", strip_extension(image?));
             (exists(&name) && !self.drawn().contains(&name.to_ascii_lowercase())).then_some(name)
         };
-        let normals = normals.map(|stage| NormalMap {
-            image: stage.image,
-            scale: stage.scale,
-        });
+        let normals = normals.map(|stage| NormalMap::downward(stage.image, stage.scale));
         let normals = normals.or_else(|| {
-            Some(NormalMap {
-                image: NORMALS.iter().find_map(|suffix| beside(suffix))?,
-                scale: Vec2::ONE,
-            })
+            let image = NORMALS.iter().find_map(|suffix| beside(suffix))?;
+            Some(NormalMap::downward(image, Vec2::ONE))
         });
         let mut finish = Finish {
             normals,
@@ -188,7 +183,7 @@ mod tests {
         let a = finish(&replaced, "t/a", &["t/a_n"]);
         let normals = NormalMap {
             image: "t/x".to_owned(),
-            scale: Vec2::splat(2.0),
+            scale: Vec2::new(2.0, -2.0), // y of the map points down
         };
         assert_eq!(a.normals, Some(normals));
         assert!((a.roughness.unwrap() - 0.2).abs() < 1e-6);

@@ -203,14 +203,31 @@ fn floor_roughness(at: Vec2) -> Texel {
     (Vec3::new(1.0, 0.8 - 0.73 * wet(at), 0.0), 1.0)
 }
 
+/// Direction of the second component of a normal map in its image.
+#[derive(Clone, Copy)]
+enum Second {
+    /// Up, as files of materials have it.
+    Up,
+    /// Down, as `opengl2` has it.
+    Down,
+}
+
 /// The normals of a height that repeats; `scale`: height of 1 in widths of the image.
-fn normals(height: impl Fn(Vec2) -> f32 + Sync, scale: f32) -> impl Fn(Vec2) -> Texel + Sync {
+fn normals(
+    height: impl Fn(Vec2) -> f32 + Sync,
+    scale: f32,
+    second: Second,
+) -> impl Fn(Vec2) -> Texel + Sync {
     move |at| {
         const STEP: f32 = 1.0 / 512.0;
         let of = |x: f32, y: f32| height((at + Vec2::new(x, y)).fract_gl());
         let x = (of(STEP, 0.0) - of(-STEP, 0.0)) * scale / (2.0 * STEP);
         let y = (of(0.0, STEP) - of(0.0, -STEP)) * scale / (2.0 * STEP);
-        // images count rows downwards, normal maps upwards
+        // rows count downwards
+        let y = match second {
+            Second::Up => y,
+            Second::Down => -y,
+        };
         (Vec3::new(-x, y, 1.0).normalize_or_zero() * 0.5 + 0.5, 1.0)
     }
 }
@@ -222,7 +239,11 @@ pub(super) fn images() -> Vec<(String, Vec<u8>)> {
     let mut add =
         |name: &str, side: usize, recipe: Recipe| all.push((name.to_owned(), side, recipe));
     add("brick", 128, Box::new(brick));
-    add("brick_n", 128, Box::new(normals(brick_height, 0.018)));
+    add(
+        "brick_n",
+        128,
+        Box::new(normals(brick_height, 0.018, Second::Down)),
+    );
     add("brick_s", 128, Box::new(brick_gloss));
     add("floor", 128, Box::new(floor));
     add(
@@ -231,6 +252,7 @@ pub(super) fn images() -> Vec<(String, Vec<u8>)> {
         Box::new(normals(
             |at| floor_height(at) * (1.0 - 0.9 * wet(at)),
             0.012,
+            Second::Up,
         )),
     );
     add("floor_surface", 128, Box::new(floor_roughness));

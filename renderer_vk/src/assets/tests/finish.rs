@@ -105,7 +105,11 @@ fn packs_state_reflection_in_words_of_opengl2() {
     assert_eq!(state(&game, grey), 0);
     assert_eq!(state(&game, pane), 0, "no body");
     let specular = game.materials.get(wall).specular;
-    assert_eq!(specular.normal_scale.to_array(), [0.5; 2]);
+    assert_eq!(
+        specular.normal_scale.to_array(),
+        [0.5, -0.5],
+        "y points down"
+    );
     assert_eq!(specular.reflectance.to_array(), [0.5; 3]);
     assert_eq!((specular.roughness, specular.metal), (0.75, 0.0));
     let specular = game.materials.get(plain).specular;
