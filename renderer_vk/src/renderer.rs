@@ -456,6 +456,10 @@ impl Renderer {
         if let (Some(world), Some(assets)) = (&mut self.world, &mut self.assets) {
             let settings = &self.settings;
             let lit = world.light_by(settings.rt_lights, assets, self.calibrations.as_ref());
+            // files of materials may have changed
+            if assets.materials.has_normals() {
+                world.need_relief(&self.device)?;
+            }
             let made = lit || self.trace.is_none();
             if made {
                 let tracer = Tracer::of(self.device.info(), settings.rt_tracer);

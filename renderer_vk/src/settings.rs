@@ -123,6 +123,8 @@ settings! { variables {
     dlight_intensity: f32 = "r_dlightIntensity", "1", ARCHIVE, kept(0.1, 1.0), Frame, GoesOn, "Multiplies the colour of dynamic lights with r_dlightMode 1 and 2.";
     dlight_specular_power: f32 = "r_dlightSpecPower", "8", ARCHIVE, kept(1.0, 32.0), Frame, GoesOn, "Exponent of the highlights of dynamic lights with r_dlightMode 1 and 2.";
     dlight_specular: f32 = "r_dlightSpecColor", "-0.25", ARCHIVE, kept(-1.0, 1.0), Frame, GoesOn, "Reflectance of these highlights; negative: factor of the surface's texture.";
+    normal_mapping: bool = "r_normalMapping", "0", ARCHIVE | LATCH, None, Frame, GoesOn, "1 shows normal maps in the classic look, as opengl2 does.";
+    specular_mapping: bool = "r_specularMapping", "0", ARCHIVE | LATCH, None, Frame, GoesOn, "1 shows highlights of rough surfaces in the classic look.";
     face_plane_cull: bool = "r_facePlaneCull", "1", ARCHIVE, None, Frame, GoesOn, "0 draws flat surfaces that face away from the camera, too; they stay invisible.";
     rail_width: f32 = "r_railWidth", "16", ARCHIVE, None, Frame, GoesOn, "Diameter of the rings of a rail trail.";
     rail_core_width: f32 = "r_railCoreWidth", "6", ARCHIVE, None, Frame, GoesOn, "Half width of the core of a rail trail.";

@@ -2,15 +2,22 @@
 // A draw of the classic look: one or more passes of a material (each a product of texture and colour, with an alpha
 // test), the blob of a dynamic light, or fog.
 // variants: MANY=-DMANY_STAGES
+// variants: RELIEF=-DMANY_STAGES -DWITH_RELIEF
 // variants: COUNT=-DMANY_STAGES -DCOUNT_FRAGMENTS
 // Specialization constants (`draw.glsl`) remove unused code. Without `discard` the GPU tests depth before shading.
 #include "raster/draw.glsl"
 
 layout(location = 0) in vec4 in_uv[STAGE_PAIRS]; // two stages each
 layout(location = 2) in float in_clip;
-layout(location = 3) in flat uvec4 in_textures; // see `Draw`
+layout(location = 3) in flat uvec4 in_textures; // see `Draw`; with relief, the index of the draw
 layout(location = 4) in vec4 in_color[STAGES];
 layout(location = 8) in flat vec4 in_flat_color[STAGES];
+
+#ifdef WITH_RELIEF
+layout(location = 12) in vec4 in_normal; // see `draw.vert`
+layout(location = 13) in vec4 in_tangent;
+layout(location = 14) in vec4 in_light;
+#endif
 
 layout(location = 0) out vec4 out_color;
 
@@ -21,16 +28,22 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Counter { ui
 // The indices are dynamically uniform within a draw and need no `nonuniformEXT`.
 vec4 sample_stage(uint stage) {
     if ((TEXTURES >> stage & 1) == 0) return vec4(1.0);
+#ifdef WITH_RELIEF
+    uint handle = Draws(VIEW.draws).at[in_textures.x].textures[stage];
+#else
     uint handle = in_textures[stage];
+#endif
     vec2 uv = (stage & 1) == 0 ? in_uv[stage / 2].xy : in_uv[stage / 2].zw;
     return texture(sampler2D(textures[handle & 0xFFFFFF], samplers[handle >> 24]), uv);
 }
 
+vec4 stage_color(uint stage) {
+    uint kind = of_stage(COLOR, stage);
+    return kind == COLOR_FLAT ? in_flat_color[stage] : kind == COLOR_VERTEX ? in_color[stage] : vec4(1.0);
+}
+
 vec4 stage_value(uint stage) {
-    vec4 color = sample_stage(stage);
-    if (of_stage(COLOR, stage) == COLOR_FLAT) color *= in_flat_color[stage];
-    if (of_stage(COLOR, stage) == COLOR_VERTEX) color *= in_color[stage];
-    return color;
+    return sample_stage(stage) * stage_color(stage);
 }
 
 bool passes_alpha_test(uint stage, vec4 color) {
@@ -80,6 +93,12 @@ vec4 onto(vec4 before, uint stage) {
 }
 #endif
 
+#ifdef WITH_RELIEF
+#include "raster/relief.glsl"
+#else
+vec4 relief_after(uint stage, vec4 color) { return color; }
+#endif
+
 #ifdef MANY_STAGES
 // Light that the first stage's texture reflects: diffuse with a linear falloff of d^2/r^2, and a Blinn-Phong highlight
 // (Quake3e's `ARB_BuildDlightFP`). The vectors are not normalized, the normal neither: as there.
@@ -121,9 +140,10 @@ void main() {
         if (!passes_alpha_test(0, out_color)) discard;
 #ifdef MANY_STAGES
         // unrolled by hand, so that arguments are constant for every compiler
-        out_color = onto(out_color, 1);
-        out_color = onto(out_color, 2);
-        out_color = onto(out_color, 3);
+        out_color = relief_after(0, out_color);
+        out_color = relief_after(1, onto(out_color, 1));
+        out_color = relief_after(2, onto(out_color, 2));
+        out_color = relief_after(3, onto(out_color, 3));
 #endif
     }
 #ifdef COUNT_FRAGMENTS

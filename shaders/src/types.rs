@@ -27,6 +27,16 @@ pub struct Vertex {
     pub color: u32,
 }
 
+/// What relief needs of a static vertex; with relief alone, in parallel to the world's vertices. Space of the vertex.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Relief {
+    /// Unit tangent along s, as MikkTSpace; zero if the texture coordinates define none.
+    pub tangent: Vec3,
+    /// Unit direction from which most of the baked light comes.
+    pub light: Vec3,
+}
+
 /// A periodic function: `base + table(function, phase + time * frequency) * amplitude`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -275,6 +285,8 @@ pub struct RasterView {
     pub materials: MaterialBuffers,
     /// The world's [`Vertex`] array.
     pub static_vertices: u64,
+    /// The world's [`Relief`] array; 0 if no draw needs it.
+    pub static_relief: u64,
     /// [`Vertex`] array of moving geometry.
     pub dynamic_vertices: u64,
     /// [`Instance`]s.
@@ -314,6 +326,8 @@ pub struct Draw {
     pub light: u32,
     /// 1: the vertices are in `dynamic_vertices`.
     pub dynamic_vertices: u32,
+    /// Index of the material, of draws with relief.
+    pub material: u32,
 }
 
 /// A dynamic light as the classic look draws it.

@@ -144,26 +144,37 @@ Gloss body_gloss(SurfacePoint p, Material material, Footprint footprint, out flo
     return Gloss(reflectance, rough * rough);
 }
 
-// The shading normal of a point, on the side of its face: from the normal map, if the material has one. Tangents follow
-// the texture coordinates of the triangle (Mikkelsen, Simulation of Wrinkled Surfaces Revisited, 2008), perpendicular to
-// the interpolated normal.
-vec3 mapped_normal(SurfacePoint p, Material material, Footprint footprint) {
-    Specular specular = material.specular;
-    if (HAS_GLOSS == 0 || (material.flags & MATERIAL_NORMALS) == 0) return p.normal;
+// Tangent of a point along s, and `along_t`: the direction in which t grows. Vertices of the map have MikkTSpace's tangents;
+// on what moves the tangent is the triangle's.
+vec3 surface_tangent(SurfacePoint p, out vec3 along_t) {
     TraceVertices vertices = TraceVertices(p.vertices);
-    Vertex a = vertices.at[p.triangle.indices[0]], b = vertices.at[p.triangle.indices[1]], c = vertices.at[p.triangle.indices[2]];
+    uvec3 corners = uvec3(p.triangle.indices[0], p.triangle.indices[1], p.triangle.indices[2]);
+    Vertex a = vertices.at[corners.x], b = vertices.at[corners.y], c = vertices.at[corners.z];
     Instance instance = instance_of(p.instance);
     mat3 axis = mat3(instance.axis[0], instance.axis[1], instance.axis[2]);
     vec3 ab = axis * (b.position - a.position), ac = axis * (c.position - a.position);
     vec2 sb = b.st - a.st, sc = c.st - a.st;
-    float turn = sb.x * sc.y - sb.y * sc.x;
-    vec3 tangent = (ab * sc.y - ac * sb.y) * sign(turn);
+    float turn = sign(sb.x * sc.y - sb.y * sc.x);
+    along_t = (ac * sb.x - ab * sc.x) * turn;
+    if (VIEW.scene.relief != 0 && (p.triangle.flags & TRIANGLE_STATIC) != 0) {
+        Reliefs relief = Reliefs(VIEW.scene.relief);
+        vec3 tangent = relief.at[corners.x].tangent * p.weights.x + relief.at[corners.y].tangent * p.weights.y + relief.at[corners.z].tangent * p.weights.z;
+        if (tangent != vec3(0.0)) return axis * tangent;
+    }
+    return (ab * sc.y - ac * sb.y) * turn;
+}
+
+// The shading normal of a point, on the side of its face: from the normal map, if the material has one.
+vec3 mapped_normal(SurfacePoint p, Material material, Footprint footprint) {
+    Specular specular = material.specular;
+    if (HAS_GLOSS == 0 || (material.flags & MATERIAL_NORMALS) == 0) return p.normal;
+    vec3 along_t;
+    vec3 tangent = surface_tangent(p, along_t);
     tangent = safe_normalize(tangent - p.normal * dot(p.normal, tangent), vec3(0.0));
     if (tangent == vec3(0.0)) return p.normal;
     // t points down in texture coordinates, up in normal maps
-    vec3 along = (ac * sb.x - ab * sc.x) * sign(turn);
     vec3 up = cross(p.normal, tangent);
-    if (dot(up, along) > 0.0) up = -up;
+    if (dot(up, along_t) > 0.0) up = -up;
     Lookups lookups = Lookups(vec2(0.0), 1.0, texture_lod(specular.normals, p.texel_scale, footprint.width));
     vec2 texel = texel_mean(specular.normals, specular.sampler_index, p.stage.st, lookups).xy;
     // as `opengl2`: the third component follows from the others

@@ -50,6 +50,12 @@ impl Materials {
         self.list.iter().any(|material| material.flags & gloss != 0)
     }
 
+    /// Whether a material has a normal map.
+    pub fn has_normals(&self) -> bool {
+        let has = |material: &Material| material.flags & c::MATERIAL_NORMALS != 0;
+        self.list.iter().any(has)
+    }
+
     /// Whether a rough material reflects more than [`LITTLE`] at normal incidence.
     pub fn has_metal(&self) -> bool {
         self.list.iter().any(|material| material.metallic)

@@ -1,6 +1,7 @@
 //! A registered material: a script's definition bound to images, in the form that the passes read.
 
 use super::finish::OfScript;
+use super::relief::LitTexture;
 use shaders::types::{Dielectric, Specular};
 use shaderscript::{AlphaGen, Cull, Deform, Fog, Shader, TcGen};
 
@@ -123,6 +124,8 @@ pub struct Material {
     pub stage_count: u32,
     /// GPU stage whose texture reflects dynamic lights that are evaluated per pixel.
     pub light_stage: Option<u32>,
+    /// Its first texture under light, which normal maps and maps of reflection vary; stages are GPU stages.
+    pub lit_texture: Option<LitTexture>,
     /// Set for skies.
     pub sky: Option<SkyBox>,
     /// Fog parameters, for the materials of fog brushes.

@@ -21,6 +21,7 @@ use super::light_stage;
 use super::material::{LightmapClass, Material, SkyBox, VideoStage};
 use super::material_buffers::Uploaded;
 use super::prepare::grey;
+use super::relief;
 use super::source::{ImageFlags, ImageSource};
 use crate::settings::Settings;
 
@@ -374,6 +375,7 @@ impl Materials {
             stage_count,
             light_stage: light_stage::light_stage(&shader, sort)
                 .and_then(|stage| stage_first.checked_add(u32::try_from(stage).ok()?)),
+            lit_texture: relief::lit_texture(&shader, class).map(|lit| lit.of_gpu(stage_first)),
             sky,
             fog: shader.fog,
             surface_flags: shader.surface_flags,

@@ -14,6 +14,7 @@ mod materials;
 mod model_load;
 mod models;
 pub mod prepare;
+mod relief;
 mod skins;
 mod source;
 mod textures;
@@ -28,6 +29,7 @@ pub use materials::{MaterialSettings, Materials};
 pub use models::{IqmModel, Md3Lod, MdrModel, Model, Models};
 pub use prepare::TextureSettings;
 pub(crate) use prepare::{desaturate, grey};
+pub use relief::TextureLight;
 pub use skins::Skins;
 #[cfg(test)]
 pub use source::ImageFlags;

@@ -106,6 +106,7 @@ fn static_scene<'a>(world: &'a World, fogs: &'a [Fog]) -> StaticScene<'a> {
     StaticScene {
         vertices: &data.vertices,
         vertex_address: world.vertex_buffer.address(),
+        relief_address: world.relief_address(),
         indices: &data.indices,
         surfaces: surfaces
             .map(|(s, number)| StaticSurface {

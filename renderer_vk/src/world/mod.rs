@@ -4,12 +4,14 @@ mod grid;
 mod load;
 mod marks;
 mod patch_lod;
+mod relief;
 mod tokens;
 mod visible;
 
 use glam::Vec3;
 use q3bsp::{LightGridLayout, Plane, SurfaceKind};
 use relight::RelitWorld;
+use relight::materials::by_hand::MaterialsByHand;
 use shaders::types::{self, Vertex};
 use support::Aabb;
 use support::slice::{part, span};
@@ -201,6 +203,8 @@ pub struct World {
     pub index_buffer: Buffer,
     /// `types::Fog`; a surface's `fog` less one is the index.
     pub fog_buffer: Buffer,
+    /// `types::Relief`, parallel to the vertices; `None` until something needs it.
+    relief: Option<Buffer>,
     /// Light of the map for the traced look; `None` before the first traced view.
     lit: Option<Lit>,
     /// The current light before files changed it; `None` before the first traced view.
@@ -282,7 +286,7 @@ impl World {
             .map(|m| (m.bounds.mins, m.bounds.maxs))
             .collect();
         assets.models.register_inline(&bounds);
-        Ok(Self {
+        let mut world = Self {
             vertex_buffer: Buffer::with_data(
                 device,
                 "world vertices",
@@ -297,9 +301,51 @@ impl World {
             )?,
             fog_buffer: Buffer::with_data(device, "fogs", BufferUsage::STORAGE, &data.fogs)?,
             data,
+            relief: None,
             lit: None,
             before: None,
-        })
+        };
+        if settings.normal_mapping || settings.specular_mapping {
+            world.read_materials(assets);
+            if assets.materials.has_gloss() {
+                world.need_relief(device)?;
+            }
+        }
+        Ok(world)
+    }
+
+    /// Address of what normal maps and highlights need of the vertices; 0 before
+    /// [`need_relief`](Self::need_relief).
+    pub fn relief_address(&self) -> u64 {
+        self.relief.as_ref().map_or(0, Buffer::address)
+    }
+
+    /// Computes tangents and light directions of the vertices, unless they exist.
+    ///
+    /// # Errors
+    /// The device is out of memory.
+    pub fn need_relief(&mut self, device: &Device) -> Result<(), gpu::Error> {
+        if self.relief.is_none() {
+            let begin = std::time::Instant::now();
+            let relief = self.data.relief();
+            let buffer =
+                Buffer::with_data(device, "relief of the world", BufferUsage::STORAGE, &relief)?;
+            self.relief = Some(buffer);
+            let seconds = begin.elapsed().as_secs_f32();
+            log::debug!("{}: tangents took {seconds:.2} s", self.data.relit.name);
+        }
+        Ok(())
+    }
+
+    /// Reads files of materials for the classic look, which shows their normal maps and highlights by the settings. The
+    /// traced look reads them with its lights.
+    fn read_materials(&mut self, assets: &mut Assets) {
+        let files = std::sync::Arc::clone(assets.textures.files());
+        let (by_hand, faults) = MaterialsByHand::load(&*files, &self.data.relit.name);
+        let of_images = (assets.materials).set_by_hand(by_hand, &mut assets.textures);
+        for warning in faults.iter().chain(&of_images) {
+            log::warn!("{}: {warning}", self.data.relit.name);
+        }
     }
 
     /// Selects the light of the map for the traced look: `false` if it is already selected. Call before light lists are

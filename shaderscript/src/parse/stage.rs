@@ -326,7 +326,8 @@ impl DefinitionParser<'_, '_, '_> {
     }
 
     fn rgb_gen(&mut self, draft: &mut Draft) {
-        const SIMPLE: [(&str, RgbGen); 8] = [
+        // the last two are words of `opengl2` for vertex colours under normal maps
+        const SIMPLE: [(&str, RgbGen); 10] = [
             ("identity", RgbGen::Identity),
             ("identityLighting", RgbGen::IdentityLighting),
             ("entity", RgbGen::Entity),
@@ -335,6 +336,8 @@ impl DefinitionParser<'_, '_, '_> {
             ("exactVertex", RgbGen::ExactVertex),
             ("lightingDiffuse", RgbGen::LightingDiffuse),
             ("oneMinusVertex", RgbGen::OneMinusVertex),
+            ("vertexLit", RgbGen::Vertex),
+            ("exactVertexLit", RgbGen::ExactVertex),
         ];
         let Some(kind) = self.lexer.token_on_line() else {
             self.warn("rgbGen without an argument");

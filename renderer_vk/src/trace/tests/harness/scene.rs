@@ -410,6 +410,7 @@ impl Scene {
         let scene = StaticScene {
             vertices: &self.vertices,
             vertex_address: vertices.address(),
+            relief_address: 0,
             indices: &self.indices,
             surfaces: self.surfaces.clone(),
             fogs: &self.fogs,

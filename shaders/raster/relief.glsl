@@ -1,0 +1,115 @@
+// Relief of a draw: a normal map and a highlight vary the baked light of a surface, or the light of the grid on a model.
+// Source: `lightall_fp.glsl` and `lightall_vp.glsl` of ioquake3's `opengl2`, without cube maps and parallax.
+
+// Part of the baked light that has the direction of `in_light`; the rest has none.
+const float DIRECTED_PART = 0.75;
+// Largest factor by which the directed part is divided for the angle at which the baked light arrived.
+const float LEAST_INCIDENCE = 0.25;
+// `r_deluxeSpecular`, its default: exponent of the roughness under baked light, factor of the highlight under the grid's.
+const float HIGHLIGHT = 0.3;
+// The lobe of less roughness is smaller than a pixel.
+const float LEAST_ROUGHNESS = 0.05;
+
+vec3 unit(vec3 v, vec3 otherwise) {
+    float squared = dot(v, v);
+    return squared > 1.0e-30 ? v * inversesqrt(squared) : otherwise;
+}
+
+vec2 texture_uv() { return (TEXTURE_STAGE & 1) == 0 ? in_uv[TEXTURE_STAGE / 2].xy : in_uv[TEXTURE_STAGE / 2].zw; }
+
+vec4 map_texel(uint map, uint map_sampler) { return texture(sampler2D(textures[map], samplers[map_sampler]), texture_uv()); }
+
+// The mapped normal. Tangents are those of the vertices, or else those of the triangle.
+vec3 relief_normal(Specular specular, vec3 normal, vec3 to_viewer) {
+    vec3 px = -dFdx(to_viewer), py = -dFdy(to_viewer);
+    vec2 sx = dFdx(texture_uv()), sy = dFdy(texture_uv());
+    float turn = sign(sx.x * sy.y - sx.y * sy.x);
+    vec3 along_s = (px * sy.y - py * sx.y) * turn, along_t = (py * sx.x - px * sy.x) * turn;
+    vec3 tangent = in_tangent.xyz == vec3(0.0) ? along_s : in_tangent.xyz;
+    tangent = unit(tangent - normal * dot(normal, tangent), vec3(0.0));
+    // t points down in texture coordinates, up in normal maps
+    vec3 up = cross(normal, tangent);
+    if (dot(up, along_t) > 0.0) up = -up;
+    vec2 local = (map_texel(specular.normals, specular.sampler_index).xy * 2.0 - 1.0) * specular.normal_scale;
+    return unit(tangent * local.x + up * local.y + normal * sqrt(max(1.0 - dot(local, local), 0.0)), normal);
+}
+
+// A surface of a texture. Metal scatters as its texture would: the look reflects no surroundings, without which metal is
+// black (`opengl2` has cube maps for it).
+struct Reflecting {
+    vec3 reflectance; // at normal incidence
+    vec3 scattered;   // part of the light that the texture scatters
+    float roughness;
+};
+
+Reflecting reflecting(Specular specular, uint flags, vec3 base) {
+    vec4 map = specular.map == NO_TEXTURE ? vec4(1.0) : map_texel(specular.map, specular.sampler_index);
+    vec3 reflectance = specular.reflectance;
+    float metal = specular.metal, roughness = specular.roughness;
+    if ((flags & MATERIAL_SPECULAR_MAP) != 0) {
+        reflectance *= map.rgb;
+        roughness = 1.0 - map.a * (1.0 - roughness);
+    } else {
+        metal *= map.b;
+        roughness *= map.g;
+    }
+    return Reflecting(mix(reflectance, base, metal), 1.0 - reflectance * (1.0 - metal), roughness);
+}
+
+// A GGX lobe (`CalcSpecular`).
+float lobe(float normal_half, float view_half, float roughness) {
+    float alpha = roughness * roughness, squared = alpha * alpha;
+    float d = normal_half * normal_half * (squared - 1.0) + 1.0;
+    float v = view_half * view_half * (roughness + 0.5) + 1.0e-8;
+    return squared / (4.0 * d * d * v);
+}
+
+// `color`: the texture under its light, without relief.
+vec4 with_relief(vec4 color) {
+    Draws draws = Draws(VIEW.draws);
+    uint draw = in_textures.x;
+    Material material = Materials(VIEW.materials.materials).at[draws.at[draw].material];
+    vec3 to_viewer = vec3(in_normal.w, in_tangent.w, in_light.w);
+    vec3 view = unit(to_viewer, vec3(0.0, 0.0, 1.0));
+    // of both sides of a surface, the one that is seen
+    vec3 face = cross(dFdx(to_viewer), dFdy(to_viewer));
+    if (dot(face, view) < 0.0) face = -face;
+    vec3 flat_normal = unit(in_normal.xyz, unit(face, view));
+    if (dot(flat_normal, face) < 0.0) flat_normal = -flat_normal;
+    vec3 light = unit(in_light.xyz, flat_normal);
+    vec3 normal = (RELIEF & RELIEF_NORMALS) == 0 ? flat_normal : relief_normal(material.specular, flat_normal, to_viewer);
+    float incidence = clamp(dot(normal, light), 0.0, 1.0);
+
+    Reflecting surface = Reflecting(vec3(0.0), vec3(1.0), 1.0);
+    if ((RELIEF & RELIEF_HIGHLIGHT) != 0) surface = reflecting(material.specular, material.flags, sample_stage(TEXTURE_STAGE).rgb);
+
+    vec3 whole; // light over that of `color`
+    vec3 directed;
+    float roughness = surface.roughness, strength = 1.0;
+    if ((RELIEF & RELIEF_SOURCE) == RELIEF_OF_GRID) {
+        Instance instance = Instances(VIEW.instances).at[draws.at[draw].instance];
+        bool lit = (instance.flags & INSTANCE_UNLIT) == 0;
+        directed = lit ? instance.directed : vec3(0.0);
+        whole = (lit ? instance.ambient : vec3(0.0)) + directed * incidence;
+        strength = HIGHLIGHT;
+    } else {
+        float baked = clamp(dot(flat_normal, light), 0.0, 1.0);
+        float factor = DIRECTED_PART / max(baked, LEAST_INCIDENCE);
+        whole = vec3(factor * incidence + max(1.0 - factor * baked, 0.0));
+        directed = factor * stage_color(TEXTURE_STAGE).rgb;
+        if (LIGHT_STAGE != 0) directed *= stage_value(LIGHT_STAGE - 1).rgb;
+        roughness = pow(roughness, HIGHLIGHT);
+    }
+    color.rgb *= surface.scattered * whole;
+    if ((RELIEF & RELIEF_HIGHLIGHT) != 0) {
+        vec3 middle = unit(light + view, normal);
+        float normal_half = clamp(dot(normal, middle), 0.0, 1.0), view_half = clamp(dot(view, middle), 0.0, 1.0);
+        color.rgb += directed * surface.reflectance * (lobe(normal_half, view_half, max(roughness, LEAST_ROUGHNESS)) * strength * incidence);
+    }
+    return color;
+}
+
+// Applies relief to the stages up to `stage`, if these are the texture and its light.
+vec4 relief_after(uint stage, vec4 color) {
+    return RELIEF != 0 && stage + 1 == max(TEXTURE_STAGE + 1, LIGHT_STAGE) ? with_relief(color) : color;
+}
