@@ -148,6 +148,8 @@ pub struct Specular {
     pub glow_radiance: f32,
     /// Bindless sampler of all.
     pub sampler_index: u32,
+    /// Stage that has the texture coordinates of the maps; `NO_STAGE`: those of the vertices.
+    pub stage: u32,
     /// Factors of the normals' first two components; the third completes them to unit length.
     pub normal_scale: Vec2,
     /// Part of the light that the surface mirrors sharply, beside its stages.

@@ -128,6 +128,17 @@ vec4 stage_texel(Stage stage, SurfacePoint p, Instance instance, Footprint footp
     return texel_mean(image, stage.sampler_index, uv, lookups);
 }
 
+// A map of a material at the point, where the material's texture is.
+vec4 map_texel(Specular specular, uint map, SurfacePoint p, Footprint footprint) {
+    vec2 uv = p.stage.st;
+    mat2 jacobian = mat2(1.0);
+    if (specular.stage != NO_STAGE) {
+        uv = stage_texcoord(VIEW.materials, Stages(VIEW.materials.stages).at[specular.stage], instance_of(p.instance), p.stage, jacobian);
+    }
+    float scale = p.texel_scale * sqrt(abs(determinant(jacobian)));
+    return texel_mean(map, specular.sampler_index, uv, Lookups(vec2(0.0), 1.0, texture_lod(map, scale, footprint.width)));
+}
+
 // Whether the point is solid: whether a stage that writes depth passes its alpha test.
 bool is_solid_at(SurfacePoint p, float width) {
     Material material = material_of(p.triangle.material);
@@ -298,8 +309,7 @@ vec3 bounded_albedo(Material material, vec3 lit) {
 // Emission by the material's emissive map, linear.
 vec3 glow_map(SurfacePoint p, Material material, Footprint footprint) {
     if ((material.flags & MATERIAL_GLOWS) == 0 || (VIEW.flags & VIEW_FULLBRIGHT) != 0) return vec3(0.0);
-    Lookups lookups = Lookups(vec2(0.0), 1.0, texture_lod(material.specular.glow, p.texel_scale, footprint.width));
-    vec3 texel = texel_mean(material.specular.glow, material.specular.sampler_index, p.stage.st, lookups).rgb;
+    vec3 texel = map_texel(material.specular, material.specular.glow, p, footprint).rgb;
     return decode_display(texel) * material.specular.glow_radiance;
 }
 

@@ -127,10 +127,7 @@ Gloss body_gloss(SurfacePoint p, Material material, Footprint footprint, out flo
     Specular specular = material.specular;
     metal = specular.metal;
     vec4 map = vec4(1.0);
-    if (specular.map != NO_TEXTURE) {
-        Lookups lookups = Lookups(vec2(0.0), 1.0, texture_lod(specular.map, p.texel_scale, footprint.width));
-        map = texel_mean(specular.map, specular.sampler_index, p.stage.st, lookups);
-    }
+    if (specular.map != NO_TEXTURE) map = map_texel(specular, specular.map, p, footprint);
     vec3 reflectance = specular.reflectance;
     float rough;
     if ((material.flags & MATERIAL_SPECULAR_MAP) != 0) {
@@ -175,8 +172,7 @@ vec3 mapped_normal(SurfacePoint p, Material material, Footprint footprint) {
     // t points down in texture coordinates, up in normal maps
     vec3 up = cross(p.normal, tangent);
     if (dot(up, along_t) > 0.0) up = -up;
-    Lookups lookups = Lookups(vec2(0.0), 1.0, texture_lod(specular.normals, p.texel_scale, footprint.width));
-    vec2 texel = texel_mean(specular.normals, specular.sampler_index, p.stage.st, lookups).xy;
+    vec2 texel = map_texel(specular, specular.normals, p, footprint).xy;
     // as `opengl2`: the third component follows from the others
     vec2 tangential = (texel * 2.0 - 1.0) * specular.normal_scale;
     vec3 local = vec3(tangential, sqrt(max(1.0 - dot(tangential, tangential), 0.0)));

@@ -11,7 +11,8 @@ use super::losses::report_losses;
 use super::reflection::{Reflection, ReflectionImage};
 use super::stack::{self, Moment, Part, tiling};
 use crate::materials::light::{
-    LightLinear, SurfaceClass, base_stage, cut_out_stage, glow_stages, refraction_index,
+    LEAST_SLIME_TRANSMISSION, LIQUID_DEPTH, LightLinear, SurfaceClass, base_stage, cut_out_stage,
+    glow_stages, liquid_color, refraction_index,
 };
 use crate::world::WorldMaterial;
 use glam::{Vec2, Vec3, Vec4};
@@ -21,12 +22,6 @@ use shaderscript::{
     TcMod, eval,
 };
 
-/// Distance in a liquid after which white light has the colour that its surface shows, id units; as the traced look.
-const LIQUID_DEPTH: f32 = 512.0;
-/// What passes less than this is not seen through: it stays what its stages show.
-const LEAST_TRANSMISSION: f32 = 0.15;
-/// Darkest that a liquid colours one channel over its depth.
-const LEAST_COLOR: f32 = 0.05;
 /// Roughness of what has a stage that shows its surroundings.
 const SHINY: f32 = 0.3;
 /// End of the message about such a stage.
@@ -501,7 +496,7 @@ fn dielectric(shader: &Shader, drawn: &LightLinear, look: &mut Look) {
         return; // neither glass nor a liquid
     };
     let transmission = drawn.through.max_element().clamp(0.0, 1.0);
-    if transmission < LEAST_TRANSMISSION && shader.content_flags & CONTENTS_SLIME != 0 {
+    if transmission < LEAST_SLIME_TRANSMISSION && shader.content_flags & CONTENTS_SLIME != 0 {
         return;
     }
     let liquid = crate::materials::light::classify(shader).liquid;
@@ -509,15 +504,8 @@ fn dielectric(shader: &Shader, drawn: &LightLinear, look: &mut Look) {
     look.dielectric = Some(Dielectric {
         index,
         transmission,
-        liquid: (liquid && shader.content_flags & CONTENTS_FOG == 0 && color.is_finite()).then(
-            || {
-                let color = color / color.max_element().max(1.0e-6);
-                (
-                    color.clamp(Vec3::splat(LEAST_COLOR), Vec3::ONE),
-                    LIQUID_DEPTH,
-                )
-            },
-        ),
+        liquid: (liquid && shader.content_flags & CONTENTS_FOG == 0 && color.is_finite())
+            .then(|| (liquid_color(color), LIQUID_DEPTH)),
     });
     look.alpha = Alpha::Opaque;
     look.reflection = Reflection::usual(0.0);

@@ -10,6 +10,7 @@ use crate::materials::light::SurfaceClass;
 use crate::overbright;
 use crate::world::WorldMaterial;
 use glam::{Vec2, Vec3};
+use shaderscript::{Shader, TcGen, TcMod};
 
 /// Least luminance of the mirrored part of light with which a surface is a mirror.
 const LEAST_MIRROR: f32 = 0.5;
@@ -107,7 +108,10 @@ impl ReflectionImage {
             ReflectionImage::Normals(name, scale) => {
                 let scale = Vec2::from_array(scale.map(f32::from_bits));
                 let (image, _) = super::images::load(files, name)?;
-                let path = format!("{name}_scaled_{}_{}", scale.x, scale.y);
+                let path = match scale.to_array() {
+                    [1.0, -1.0] => format!("{name}_up"),
+                    [x, y] => format!("{name}_scaled_{x}_{y}"),
+                };
                 (opaque(image, |rgb, _| scaled_normal(rgb, scale)), path)
             }
         })
@@ -159,6 +163,13 @@ fn normals(map: &NormalMap) -> Picture {
     Picture::Reflection(ReflectionImage::Normals(name, scale))
 }
 
+/// Changes to the texture coordinates of the first texture, which maps lie on.
+fn texture_mods(shader: &Shader) -> Vec<TcMod> {
+    let mut stages = shader.stages.iter();
+    let texture = stages.find(|stage| stage.tc_gen != TcGen::Lightmap);
+    texture.map_or_else(Vec::new, |stage| stage.tc_mods.clone())
+}
+
 /// Whether rays meet a body of the material, so that it can be rough, metal or glass.
 fn has_body(class: SurfaceClass) -> bool {
     use SurfaceClass::{Fog, Invisible, Mirror, Portal, Sky};
@@ -196,7 +207,10 @@ impl Export<'_> {
         if let Some(glow) = &finish.glow {
             let picture = Picture::File(glow.image.clone());
             if self.mean(layer.whole, &picture).is_some() {
-                look.glow = Some(Slot::plain(picture));
+                look.glow = Some(Slot {
+                    tc_mods: texture_mods(&layer.whole.resolved.shader),
+                    ..Slot::plain(picture)
+                });
                 look.glow_factor = Vec3::splat(glow.radiance);
             } else if self.options.images != ImagePlace::None {
                 look.lost
@@ -212,6 +226,10 @@ impl Export<'_> {
             finish.normals = None;
         }
         let shader = &material.resolved.shader;
+        let on_texture = |picture: Picture| Slot {
+            tc_mods: texture_mods(shader),
+            ..Slot::plain(picture)
+        };
         let exists = |picture: &Picture| matches!(self.picture(picture, shader), Ok(Some(_)));
         let pictured = |finish: &Finish| {
             let map = finish.surface.as_ref()?;
@@ -237,12 +255,12 @@ impl Export<'_> {
                 },
                 metal: finish.metal_or_usual(),
                 reflectance: Some(finish.reflectance_or_usual()),
-                surface: surface.map(Slot::plain),
-                specular: specular.map(Slot::plain),
+                surface: surface.map(on_texture),
+                specular: specular.map(on_texture),
                 normals: None,
             };
         }
-        look.reflection.normals = finish.normals.as_ref().map(normals).map(Slot::plain);
+        look.reflection.normals = finish.normals.as_ref().map(normals).map(on_texture);
     }
 }
 

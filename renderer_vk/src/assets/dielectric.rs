@@ -39,14 +39,6 @@ fn mean_layer(
     light::compose(&shader.stages, &samples, has_vertex_light(class))
 }
 
-/// Distance in a liquid after which white light has the colour of the liquid's surface, units.
-const LIQUID_DEPTH: f32 = 1024.0;
-/// Slime of a lower mean transmission than this is opaque to rays, whatever its class: it shows its stages. Water
-/// remains a dielectric.
-const LEAST_TRANSMISSION: f32 = 0.15;
-/// Minimum of a liquid's colour channels at [`LIQUID_DEPTH`].
-const LEAST_COLOR: f32 = 0.05;
-
 /// The `MATERIAL_*` bit of a dielectric that mirrors light.
 pub fn mirrors(dielectric: &types::Dielectric) -> u32 {
     if dielectric.index > 0.0 {
@@ -73,7 +65,8 @@ pub fn dielectric(
     }
     let mean = mean_layer(shader, class, arrays, stage_first, source);
     let passed = mean.through.max_element();
-    let dull = shader.content_flags & CONTENTS_SLIME != 0 && passed < LEAST_TRANSMISSION;
+    let dull =
+        shader.content_flags & CONTENTS_SLIME != 0 && passed < light::LEAST_SLIME_TRANSMISSION;
     if dull || !passed.is_finite() {
         return types::Dielectric::default();
     }
@@ -81,11 +74,7 @@ pub fn dielectric(
     let mut absorption = Vec3::ZERO;
     let color = mean.lit + mean.emission + mean.through;
     if liquid && color.is_finite() {
-        let color = color / color.max_element().max(1.0e-6);
-        absorption = -color
-            .clamp(Vec3::splat(LEAST_COLOR), Vec3::ONE)
-            .map(f32::ln)
-            / LIQUID_DEPTH;
+        absorption = -light::liquid_color(color).map(f32::ln) / light::LIQUID_DEPTH;
     }
     types::Dielectric {
         index: index.unwrap_or(0.0),

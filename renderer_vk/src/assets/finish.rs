@@ -5,6 +5,7 @@ use glam::Vec3;
 use relight::materials::by_hand::MaterialsByHand;
 use relight::materials::finish::{Finish, MapFault};
 use shaders::types::{Dielectric, Specular, constants as c};
+use shaderscript::TcGen;
 
 use super::compile::sampler;
 use super::material::{LightmapClass, Material};
@@ -84,6 +85,13 @@ fn has_body(flags: u32) -> bool {
     flags & (c::MATERIAL_SKY | c::MATERIAL_FOG | c::MATERIAL_INVISIBLE | c::MATERIAL_PORTAL) == 0
 }
 
+/// GPU stage of the first texture, which maps lie on, if it has other coordinates than the vertices.
+fn maps_stage(material: &Material) -> Option<u32> {
+    let mut stages = (material.stage_first..).zip(&material.shader.stages);
+    let (index, stage) = stages.find(|(_, stage)| stage.tc_gen != TcGen::Lightmap)?;
+    (!stage.tc_mods.is_empty()).then_some(index)
+}
+
 fn apply(
     material: &mut Material,
     finish: &Finish,
@@ -100,6 +108,7 @@ fn apply(
         map: c::NO_TEXTURE,
         normals: c::NO_TEXTURE,
         glow: c::NO_TEXTURE,
+        stage: maps_stage(material).unwrap_or(c::NO_STAGE),
         ..Specular::default()
     };
     if finish.plain {

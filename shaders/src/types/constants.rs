@@ -3,6 +3,8 @@
 
 /// No texture.
 pub const NO_TEXTURE: u32 = 0xFFFF_FFFF;
+/// No stage.
+pub const NO_STAGE: u32 = 0xFFFF_FFFF;
 
 pub const WAVE_SIN: u32 = 0;
 pub const WAVE_SQUARE: u32 = 1;

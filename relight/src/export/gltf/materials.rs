@@ -139,12 +139,14 @@ impl Maker<'_> {
             if look.factor != glam::Vec4::ONE || pulse.is_some_and(Pulse::factor_varies) {
                 base.insert("baseColorFactor".into(), json!(look.factor.to_array()));
             }
-            if let Some(texture) = self.map(material, &reflection.surface)? {
+            let slot = format!("{place}/pbrMetallicRoughness/metallicRoughnessTexture");
+            if let Some(texture) = self.texture(material, reflection.surface.as_ref(), &slot)? {
                 base.insert("metallicRoughnessTexture".into(), texture);
             }
         }
         out.insert("pbrMetallicRoughness".into(), base);
-        if let Some(texture) = self.map(material, &reflection.normals)? {
+        let slot = format!("{place}/normalTexture");
+        if let Some(texture) = self.texture(material, reflection.normals.as_ref(), &slot)? {
             out.insert("normalTexture".into(), texture);
         }
         let peak = pulse.map_or(0.0, Pulse::brightest);
@@ -191,7 +193,7 @@ impl Maker<'_> {
         if shown {
             self.put(&mut extensions, "KHR_materials_unlit", json!({}));
         } else {
-            self.reflectance(material, reflection, &mut extensions)?;
+            self.reflectance(material, &place, reflection, &mut extensions)?;
         }
         // Light that a white surface shows as white is an irradiance of pi.
         let lightmap = self.lightmap.filter(|_| look.lightmapped);
@@ -228,6 +230,7 @@ impl Maker<'_> {
     fn reflectance(
         &mut self,
         material: &WorldMaterial,
+        place: &str,
         reflection: &Reflection,
         extensions: &mut Map<String, Value>,
     ) -> Result<(), ExportError> {
@@ -242,7 +245,8 @@ impl Maker<'_> {
         if factor != Vec3::ONE {
             specular.insert("specularColorFactor".into(), json!(factor.to_array()));
         }
-        if let Some(texture) = self.map(material, &reflection.specular)? {
+        let slot = format!("{place}/extensions/KHR_materials_specular/specularColorTexture");
+        if let Some(texture) = self.texture(material, reflection.specular.as_ref(), &slot)? {
             specular.insert("specularColorTexture".into(), texture);
         }
         if !specular.is_empty() {
@@ -277,15 +281,6 @@ impl Maker<'_> {
                 }),
             );
         }
-    }
-
-    /// The reference to the texture of a map of reflection, which does not move.
-    fn map(
-        &mut self,
-        material: &WorldMaterial,
-        slot: &Option<Slot>,
-    ) -> Result<Option<Value>, ExportError> {
-        self.texture(material, slot.as_ref(), "")
     }
 
     /// The reference to a slot's texture, at `place` in the document; `None` when there is no such image.

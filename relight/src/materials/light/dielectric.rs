@@ -2,6 +2,8 @@
 
 use std::f32::consts::TAU;
 
+use glam::Vec3;
+
 use super::{SurfaceClass, classify, glow_stages};
 use shaderscript::surface_params::{CONTENTS_LAVA, CONTENTS_SLIME, SURF_LIGHTFILTER};
 use shaderscript::{AlphaGen, BlendFactor, Deform, RgbGen, Shader, Stage, TcGen, TcMod};
@@ -12,6 +14,18 @@ pub const INDEX_GLASS: f32 = 1.5;
 pub const INDEX_WATER: f32 = 1.33;
 /// Refraction index of slime: that of a strong solution, between water and glass.
 pub const INDEX_SLIME: f32 = 1.4;
+/// Distance in a liquid after which white light has the colour of the liquid's surface, units.
+pub const LIQUID_DEPTH: f32 = 1024.0;
+/// Slime of a lower mean transmission than this is opaque: it shows its stages. Water remains a dielectric.
+pub const LEAST_SLIME_TRANSMISSION: f32 = 0.15;
+
+/// Colour of white light after [`LIQUID_DEPTH`] in a liquid: that of its surface, its brightest channel 1. No channel
+/// vanishes.
+pub fn liquid_color(surface: Vec3) -> Vec3 {
+    const LEAST: f32 = 0.05;
+    let color = surface / surface.max_element().max(1.0e-6);
+    color.clamp(Vec3::splat(LEAST), Vec3::ONE)
+}
 
 /// Index of refraction of what lies behind a surface, or `None` where light is not refracted: everything but glass and
 /// liquids that are seen through. Lava glows and is never seen through, whatever its stages blend.

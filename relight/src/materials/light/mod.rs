@@ -12,8 +12,8 @@ mod glow;
 pub use algebra::{LightLinear, StageSample, compose, compose_encoded, darkens_behind};
 pub use baked::{BakedLight, baked_light};
 pub use dielectric::{
-    INDEX_GLASS, INDEX_SLIME, INDEX_WATER, filters_light, is_gloss, is_haze, is_reflection,
-    refraction_index, ripple_slope,
+    INDEX_GLASS, INDEX_SLIME, INDEX_WATER, LEAST_SLIME_TRANSMISSION, LIQUID_DEPTH, filters_light,
+    is_gloss, is_haze, is_reflection, liquid_color, refraction_index, ripple_slope,
 };
 pub use glow::{glow_stages, is_glowing, stage_samples_white};
 

@@ -72,7 +72,7 @@ fn files_of_materials_change_and_restore_materials() {
 
 #[test]
 fn packs_state_reflection_in_words_of_opengl2() {
-    let stages = "{\nmap t/a.tga\n}\n{\nmap $lightmap\nblendFunc filter\n}\n";
+    let stages = "{\nmap t/a.tga\ntcMod scale 2 2\n}\n{\nmap $lightmap\nblendFunc filter\n}\n";
     let words = "{\nstage normalMap\nmap t/blue\nnormalScale 0.5\n}\n{\nstage specularMap\nmap t/c\nspecularScale 0.5 0.25\n}\n";
     let script = format!(
         "t/wall\n{{\n{stages}}}\nt/pane\n{{\nsurfaceparm trans\n{{\nmap t/a\nblendFunc blend\nroughness 0.1\n}}\n}}\n"
@@ -112,7 +112,10 @@ fn packs_state_reflection_in_words_of_opengl2() {
     );
     assert_eq!(specular.reflectance.to_array(), [0.5; 3]);
     assert_eq!((specular.roughness, specular.metal), (0.75, 0.0));
+    // maps lie where the texture does
+    assert_eq!(specular.stage, game.materials.get(wall).stage_first);
     let specular = game.materials.get(plain).specular;
+    assert_eq!(specular.stage, c::NO_STAGE);
     assert_eq!(specular.reflectance.to_array(), [1.0; 3]);
     assert_eq!((specular.roughness, specular.metal), (0.0, 0.0));
     // a file by hand overrides the pack

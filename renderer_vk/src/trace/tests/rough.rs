@@ -44,6 +44,7 @@ fn shine(scene: &mut Scene, material: u32, roughness: f32, metal: f32, reflectan
         reflectance: Vec3::splat(reflectance),
         map: c::NO_TEXTURE,
         normals: c::NO_TEXTURE,
+        stage: c::NO_STAGE,
         ..Specular::default()
     };
 }
