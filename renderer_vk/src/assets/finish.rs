@@ -45,10 +45,9 @@ impl Materials {
         faults
     }
 
-    /// Whether a material is rough or has a normal map.
-    pub fn has_gloss(&self) -> bool {
-        let gloss = c::MATERIAL_ROUGH | c::MATERIAL_NORMALS;
-        self.list.iter().any(|material| material.flags & gloss != 0)
+    /// Whether a material is rough or has a normal map. `frosted`: glass counts too.
+    pub fn has_gloss(&self, frosted: bool) -> bool {
+        self.list.iter().any(|m| is_glossy(m.flags, frosted))
     }
 
     /// Whether a material has a normal map.
@@ -78,6 +77,12 @@ impl Materials {
         }
         faults
     }
+}
+
+/// Whether a material with these `MATERIAL_*` bits is rough or has a normal map. `frosted`: glass counts too.
+pub fn is_glossy(flags: u32, frosted: bool) -> bool {
+    let gloss = c::MATERIAL_ROUGH | c::MATERIAL_NORMALS;
+    flags & gloss != 0 && (frosted || flags & c::MATERIAL_GLASS == 0)
 }
 
 /// Whether rays meet a body of the material, so that it can be rough, metal or glass.

@@ -23,6 +23,8 @@ use std::sync::Arc;
 
 use relight::GameFiles;
 
+#[cfg(test)]
+pub use finish::is_glossy;
 pub use fonts::LoadedFont;
 pub use material::{Combine, LightmapClass, Material, NO_DYNAMIC_LIGHT, RasterPass};
 pub use materials::{MaterialSettings, Materials};

@@ -49,7 +49,7 @@ const FOG_AHEAD: [Pass; 2] = [Pass::FogLight, Pass::FogFilter];
 
 /// Whether frames with these settings run a pass of [`AHEAD`] on a map.
 fn is_chosen(pass: Pass, settings: &Settings, needs: MapNeeds) -> bool {
-    let gloss = needs.gloss && settings.rt_specular;
+    let gloss = needs.has_gloss(settings);
     match pass {
         Pass::SampleLights | Pass::SampledDirect | Pass::Suns => samples_one_light(settings),
         Pass::Direct => !samples_one_light(settings),
@@ -89,10 +89,20 @@ pub struct MapNeeds {
     pub fog: bool,
     /// It has flat mirrors.
     pub mirrors: bool,
-    /// Materials are rough or have normal maps.
+    /// Materials other than glass are rough or have normal maps.
     pub gloss: bool,
+    /// Materials are rough, glass included, or have normal maps.
+    pub frosted: bool,
     /// A rough material reflects more than most that are no metal.
     pub metal: bool,
+}
+
+impl MapNeeds {
+    /// Whether frames with these settings run the passes of rough surfaces.
+    fn has_gloss(&self, settings: &Settings) -> bool {
+        let used = self.gloss || self.frosted && settings.rt_accumulate;
+        settings.rt_specular && used
+    }
 }
 
 /// The states of a pass's switches that occur, one bit for each switch.
@@ -102,7 +112,7 @@ fn states(pass: Pass, settings: &Settings, needs: MapNeeds) -> Vec<usize> {
         let on = match switch {
             Switch::Bounces => settings.rt_bounces > 0,
             Switch::MapFog | Switch::LitFog => needs.fog,
-            Switch::Gloss => needs.gloss && settings.rt_specular,
+            Switch::Gloss => needs.has_gloss(settings),
         };
         if !on {
             continue;

@@ -98,8 +98,8 @@ pub struct MaterialInfo {
 pub trait MaterialTable {
     /// The material drawn for `index` (after remapping), and its facts.
     fn info(&self, index: u32) -> (u32, MaterialInfo);
-    /// Whether materials are rough or have normal maps.
-    fn has_gloss(&self) -> bool {
+    /// Whether materials are rough or have normal maps. `frosted`: rough glass counts, too.
+    fn has_gloss(&self, _frosted: bool) -> bool {
         false
     }
     /// Whether a rough material reflects more than most materials that are no metal.

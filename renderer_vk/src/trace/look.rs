@@ -66,8 +66,8 @@ impl MaterialTable for Assets {
         self.materials.generation()
     }
 
-    fn has_gloss(&self) -> bool {
-        self.materials.has_gloss()
+    fn has_gloss(&self, frosted: bool) -> bool {
+        self.materials.has_gloss(frosted)
     }
 
     fn has_metal(&self) -> bool {
@@ -262,7 +262,8 @@ impl TraceLook {
         MapNeeds {
             fog: !world.data.relit.bsp.fogs.is_empty(),
             mirrors: self.geometry.mirrors.count(true, None) > 0,
-            gloss: assets.materials.has_gloss(),
+            gloss: assets.materials.has_gloss(false),
+            frosted: assets.materials.has_gloss(true),
             metal: assets.materials.has_metal(),
         }
     }

@@ -503,9 +503,9 @@ fn fog_in_sight(map: &TracedMap<'_>, view: &TracedScene) -> bool {
     boxes.any(|(i, fog)| !view.look.portals.is_empty() || (may_see(i) && !outside(fog, &frustum)))
 }
 
-/// Whether rough surfaces and normal maps are in use.
+/// Whether rough surfaces and normal maps are in use. Frosted glass is clear in live frames.
 fn has_gloss(materials: &dyn MaterialTable, settings: &Settings) -> bool {
-    settings.rt_specular && is_lit(settings) && materials.has_gloss()
+    settings.rt_specular && is_lit(settings) && materials.has_gloss(settings.rt_accumulate)
 }
 
 /// Whether surfaces are lit; otherwise they show their albedo.

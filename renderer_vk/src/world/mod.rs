@@ -307,7 +307,7 @@ impl World {
         };
         if settings.normal_mapping || settings.specular_mapping {
             world.read_materials(assets);
-            if assets.materials.has_gloss() {
+            if assets.materials.has_gloss(false) {
                 world.need_relief(device)?;
             }
         }

@@ -14,7 +14,7 @@ fn files_of_materials_change_and_restore_materials() {
         [wall, shiny, water, sky].map(|index| game.materials.get(index).flags)
     };
     let before = flags(&game);
-    assert!(!game.materials.has_gloss());
+    assert!(!game.materials.has_gloss(true));
     let set = |game: &mut Registration, text: &str| {
         let (file, wrong) = MaterialsByHand::parse(text);
         assert_eq!(wrong, []);
@@ -36,7 +36,7 @@ fn files_of_materials_change_and_restore_materials() {
     // plain forgets the lines before it; what has no body stays as it is
     let plain = before[1] & !c::MATERIAL_REFLECTS | c::MATERIAL_PLAIN;
     assert_eq!(flags(&game)[1..], [plain, before[2], before[3]]);
-    assert!(game.materials.has_gloss());
+    assert!(game.materials.has_gloss(true));
     // later materials have the files, too
     let later = game.find("t/plain", LightmapClass::Page, true);
     assert_ne!(game.materials.get(later).flags & c::MATERIAL_ROUGH, 0);
@@ -56,18 +56,20 @@ fn files_of_materials_change_and_restore_materials() {
         game.materials.plain_image(wall).is_some()
     };
     assert!(one_image(&game));
+    set(&mut game, "glass t/wall 1.5 1 1 1\nrough t/wall 0.2");
+    assert!(game.materials.has_gloss(true) && !game.materials.has_gloss(false));
     set(&mut game, "glass t/wall 1.5 1 1 1");
     assert!(!one_image(&game));
     assert_ne!(game.materials.get(wall).flags & c::MATERIAL_CLEAR, 0);
     set(&mut game, "normals t/wall t/blue");
     assert_ne!(game.materials.get(wall).flags & c::MATERIAL_NORMALS, 0);
-    assert!(game.materials.has_gloss());
+    assert!(game.materials.has_gloss(true));
     set(&mut game, "mirror t/wall 0.5 0.5 0.5");
     assert_eq!(flags(&game)[0], before[0] | c::MATERIAL_REFLECTS);
     // without lines everything is as before
     assert_eq!(set(&mut game, ""), [""; 0]);
     assert_eq!(flags(&game), before);
-    assert!(!game.materials.has_gloss());
+    assert!(!game.materials.has_gloss(true));
 }
 
 #[test]
@@ -93,7 +95,7 @@ fn packs_state_reflection_in_words_of_opengl2() {
     let find = |game: &mut Registration, name| game.find(name, LightmapClass::Page, true);
     let [wall, pane, plain, grey] =
         ["t/wall", "t/pane", "t/plain", "t/grey"].map(|name| find(&mut game, name));
-    assert!(!game.materials.has_gloss(), "before a traced view");
+    assert!(!game.materials.has_gloss(true), "before a traced view");
     assert_eq!(game.textures.index("t/plain_n"), None);
     let faults = (game.materials).set_by_hand(MaterialsByHand::default(), &mut game.textures);
     assert_eq!(faults.len(), 1, "{faults:?}");

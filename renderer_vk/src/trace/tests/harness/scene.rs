@@ -11,6 +11,7 @@ use support::Aabb;
 
 use super::{encode, identity, rectangle, stage};
 use crate::api::{DynamicLight, EntityKind, RefDef};
+use crate::assets::is_glossy;
 use crate::gpu::{Buffer, BufferUsage, Device};
 use crate::scene::{
     DynamicMesh, Portal, RigidMesh, Shape, Submodel, TracedPart, TracedScene, View, ViewEntity,
@@ -460,9 +461,8 @@ impl MaterialTable for Table {
         1
     }
 
-    fn has_gloss(&self) -> bool {
-        let gloss = c::MATERIAL_ROUGH | c::MATERIAL_NORMALS;
-        (self.infos.iter()).any(|info| info.flags & gloss != 0)
+    fn has_gloss(&self, frosted: bool) -> bool {
+        (self.infos.iter()).any(|info| is_glossy(info.flags, frosted))
     }
 
     fn has_metal(&self) -> bool {
