@@ -16,7 +16,7 @@ void main() {
     ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(cell, bounce_cells()))) return;
     ivec2 pixel = bounce_pixel(cell);
-    if (any(greaterThanEqual(pixel, ivec2(VIEW.width, VIEW.height)))) return;
+    if (any(greaterThanEqual(pixel, ivec2(VIEW.width, VIEW.height))) || has_no_gloss(pixel)) return;
     LightTask task = bounce_task(pixel);
     BounceLight b = BounceLight(vec3(0.0), no_light(), vec3(0.0));
     PathVertex v = first_vertex(task);

@@ -42,6 +42,9 @@ bool gathers(LightTask task, out GlossPixel gloss) {
     return is_glossy(gloss.gloss);
 }
 
+// Whether no specular path starts at the pixel. Nothing reads what these passes would write for it.
+bool has_no_gloss(ivec2 pixel) { return is_specular() && !is_glossy(gloss_read(pixel).gloss); }
+
 // Bound of the light of a specular path in live frames: relative to the specular albedo.
 float most_specular_light(GlossPixel gloss) { return MOST_LIVE_LIGHT / max(max_component(gloss.lobe_albedo), 1.0e-3); }
 
