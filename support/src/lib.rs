@@ -2,6 +2,7 @@
 //!
 //! * [`aabb`]: axis-aligned boxes.
 //! * [`bvh`]: bounding volume hierarchies over boxes.
+//! * [`grid`]: uniform grids over triangles.
 //! * [`parallel`]: a function of every item, on all cores.
 //! * [`random`]: a small generator that gives the same numbers everywhere.
 //! * [`hash`]: 128-bit names for results that are kept.
@@ -16,6 +17,7 @@
 
 pub mod aabb;
 pub mod bvh;
+pub mod grid;
 pub mod hash;
 pub mod parallel;
 pub mod random;
