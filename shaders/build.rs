@@ -158,11 +158,12 @@ fn main() {
 
 /// The static that joins the modules of a ray generation shader for all tracers; empty for other modules.
 fn for_tracers(job: &Job, symbols: &BTreeSet<String>) -> String {
-    let [compute, query] = ["COMPUTE", "QUERY"].map(|v| format!("{}_{v}", job.symbol));
+    let variants = ["COMPUTE", "GRID", "QUERY"].map(|v| format!("{}_{v}", job.symbol));
+    let [compute, grid, query] = &variants;
     match job.symbol.strip_suffix("_RGEN") {
-        Some(name) if symbols.contains(&compute) && symbols.contains(&query) => format!(
+        Some(name) if variants.iter().all(|variant| symbols.contains(variant)) => format!(
             "/// `{file}` for each tracer.\npub static {name}: RayShader = RayShader {{\n    pipeline: &{pipeline},\n    \
-             compute: &{compute},\n    query: &{query},\n}};\n",
+             compute: &{compute},\n    grid: &{grid},\n    query: &{query},\n}};\n",
             file = job.file,
             pipeline = job.symbol,
         ),

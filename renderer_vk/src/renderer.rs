@@ -466,7 +466,8 @@ impl Renderer {
                 let kept = self.trace_passes.take().filter(|p| p.tracer() == tracer);
                 let new = || Arc::new(PassSet::new(&self.device, tracer));
                 let passes = self.trace_passes.insert(kept.unwrap_or_else(new));
-                self.trace = Some(TraceLook::new(passes, world, assets)?);
+                let cells = settings.rt_grid_cells;
+                self.trace = Some(TraceLook::new(passes, cells, world, assets)?);
             }
             if let (Some(passes), Some(look)) = (&self.trace_passes, &self.trace) {
                 // in each frame, because settings and materials may have changed

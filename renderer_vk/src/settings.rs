@@ -161,7 +161,8 @@ settings! { variables {
     // settings of this renderer
     rt: bool = "r_rt", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 traces light with rays, 0 draws the classic look. Switches at once.";
     low_latency: LowLatency = "r_lowLatency", "2", ARCHIVE, kept(0.0, 2.0), Frame, GoesOn, "Time from input to picture: 0 lets two frames wait for the GPU and the display, 1 one; 2 also keeps the engine until the GPU is about to need its next frame.";
-    rt_tracer: TracerChoice = "rt_tracer", "auto", ARCHIVE | LATCH, None, Start, GoesOn, "What follows the rays: auto, pipeline, query or compute. A device without it gets what auto picks.";
+    rt_tracer: TracerChoice = "rt_tracer", "auto", ARCHIVE | LATCH, None, Start, GoesOn, "What follows the rays: auto, pipeline, query, compute or grid. A device without it gets what auto picks.";
+    rt_grid_cells: u32 = "rt_gridCells", "0", ARCHIVE | LATCH, kept(0.0, 256.0), Start, GoesOn, "Cells of rt_tracer grid along the longest side of the map; 0 picks them by its triangles. Read when a map is loaded.";
     rt_lights: MapLightChoice = "rt_lights", "calibrated", ARCHIVE, None, With("rt_lights"), Restarts, "Lights of the map: calibrated, fitted to the light that its compiler stored, or prior, as its directives say. Switches at once.";
     rt_print_perf_stats: bool = "rt_printPerfStats", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 prints times, rays and memory of the traced look each second.";
     rt_illumination: bool = "rt_illumination", "1", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "0 shows surfaces in their own colour, without light.";

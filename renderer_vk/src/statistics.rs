@@ -29,8 +29,9 @@ impl PassCost {
     }
 }
 
-/// Labels of the buffers of our own hierarchies.
-const STRUCTURES: [&str; 5] = [
+/// Labels of the buffers of our own structures.
+const STRUCTURES: [&str; 6] = [
+    "trace grid",
     "trace nodes",
     "trace leafs",
     "trace rigid",
@@ -91,6 +92,19 @@ impl MemoryPurpose {
             MemoryKind::Buffer => Self::Buffers,
         }
     }
+}
+
+/// Cost of the structures of a map's constant geometry.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StructureCost {
+    /// From triangles in memory until the structures are on the device, wall time in milliseconds.
+    pub build_ms: f64,
+    /// Bytes on the device.
+    pub bytes: u64,
+    /// Triangles in them.
+    pub triangles: usize,
+    /// Cells of the map's uniform grid along each axis; `None` if it has none.
+    pub cells: Option<[u32; 3]>,
 }
 
 /// How names of passes of a traced view begin.

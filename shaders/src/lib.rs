@@ -79,6 +79,8 @@ pub struct RayShader {
     pub pipeline: &'static Spirv,
     /// A compute shader that traverses own hierarchies.
     pub compute: &'static Spirv,
+    /// The same with a uniform grid for the map's large part.
+    pub grid: &'static Spirv,
     /// A compute shader with ray queries.
     pub query: &'static Spirv,
 }

@@ -19,7 +19,9 @@ pub use lights::{
     BspNode, DynamicRow, EmittedLight, LightBounds, LightRow, LightSlot, LightView, SphereLight,
     SunLight, TriangleLight,
 };
-pub use structures::{BvhInstance, BvhNode, BvhTriangle, FilterStep, GeometryRecord, PassStep};
+pub use structures::{
+    BvhInstance, BvhNode, BvhTriangle, FilterStep, GeometryRecord, GridRecord, PassStep,
+};
 pub use surroundings::{FlareView, FogView, MirrorPlane, PortalRecord, SkyRecord, TransportView};
 pub use view::{CameraView, ExposureView, ImageView, PostView, SceneView, TargetView};
 

@@ -1,5 +1,5 @@
 // The compute tracer: two levels of bounding volume hierarchies, built on the CPU (`support/src/bvh.rs`,
-// `renderer_vk/src/trace/bvh.rs`).
+// `renderer_vk/src/trace/bvh.rs`). With TRACER_GRID an instance may have a uniform grid in place of its hierarchy.
 #ifndef RELIGHT_TRACE_BVH_GLSL
 #define RELIGHT_TRACE_BVH_GLSL
 
@@ -116,6 +116,10 @@ void bvh_sort(inout float near_a, inout uint a, inout float near_b, inout uint b
 // Value of `instance` while the top level is traversed.
 const uint BVH_TOP = 0xFFFFFFFFu;
 
+#ifdef TRACER_GRID
+#include "trace/grid.glsl"
+#endif
+
 void bvh_walk(inout BvhWalk walk, vec3 origin, uint mask) {
     if (VIEW.scene.nodes == 0) return;
     BvhRay outside = bvh_ray(origin, walk.direction);
@@ -166,6 +170,14 @@ void bvh_walk(inout BvhWalk walk, vec3 origin, uint mask) {
                     ray = bvh_ray(
                         vec3(dot(instance.to_object[0], from), dot(instance.to_object[1], from), dot(instance.to_object[2], from)),
                         vec3(dot(instance.to_object[0].xyz, d), dot(instance.to_object[1].xyz, d), dot(instance.to_object[2].xyz, d)));
+#ifdef TRACER_GRID
+                    if ((instance.mask & INSTANCE_GRID) != 0) {
+                        if (grid_walk(walk, ray, instance)) return;
+                        ray = outside;
+                        current = BVH_NONE;
+                        continue;
+                    }
+#endif
                     nodes = BvhNodes(instance.nodes);
                     triangles = BvhTriangles(instance.triangles);
                     geometry = instance.geometry;

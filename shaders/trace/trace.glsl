@@ -1,7 +1,7 @@
 // The common interface of the tracers. Passes trace rays through these functions only, so that each pass is compiled
-// for three tracers: the ray tracing pipeline, whose hit shaders report hits and decide cut-outs; ray queries
-// (TRACER_QUERY) and own hierarchies (TRACER_COMPUTE), both in compute shaders, the latter without ray tracing
-// hardware. A fourth tracer (TRACER_NONE) sends no rays, for pixels that need none.
+// for four tracers: the ray tracing pipeline, whose hit shaders report hits and decide cut-outs; in compute shaders ray
+// queries (TRACER_QUERY), and without ray tracing hardware own hierarchies (TRACER_COMPUTE), with a uniform grid for the
+// map's large part (TRACER_GRID in addition). A fifth tracer (TRACER_NONE) sends no rays, for pixels that need none.
 #ifndef RELIGHT_TRACE_TRACE_GLSL
 #define RELIGHT_TRACE_TRACE_GLSL
 

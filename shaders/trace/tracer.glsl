@@ -2,6 +2,7 @@
 // its variants:
 //
 //     variants: COMPUTE=-DTRACER_COMPUTE -S comp     own hierarchies, in compute
+//     variants: GRID=-DTRACER_COMPUTE -DTRACER_GRID -S comp     the same, with a uniform grid for the map
 //     variants: QUERY=-DTRACER_QUERY -S comp         ray queries, in compute
 //     variants: NO_RAYS=-DTRACER_NONE -S comp        no rays: see no_rays.glsl
 //

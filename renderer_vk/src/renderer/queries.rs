@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::Renderer;
 use crate::api::{MarkFragment, Orientation, PointLighting};
 use crate::error::Error;
-use crate::statistics::Costs;
+use crate::statistics::{Costs, StructureCost};
 use crate::trace::TraceLook;
 use crate::world::{LightsChanged, Marked, World};
 
@@ -105,6 +105,11 @@ impl Renderer {
             reserved: self.device.memory_report().reserved,
             latency: self.latency(),
         }
+    }
+
+    /// Cost of the map's structures; `None` without the traced look.
+    pub fn structure_cost(&self) -> Option<StructureCost> {
+        self.trace.as_ref().map(TraceLook::structure_cost)
     }
 
     /// Name of the loaded map, as given to [`load_world`](Self::load_world).

@@ -133,6 +133,8 @@ named! {
         Query = "query",
         /// Own hierarchies in compute shaders.
         Compute = "compute",
+        /// The same with a uniform grid for the map.
+        Grid = "grid",
     }
 }
 

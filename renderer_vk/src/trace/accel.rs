@@ -7,7 +7,7 @@
 use std::iter;
 
 use glam::{Mat3, Vec3};
-use shaders::trace_types::constants::NO_INSTANCE;
+use shaders::trace_types::constants::{INSTANCE_GRID, NO_INSTANCE};
 use shaders::trace_types::{BvhInstance, GeometryRecord};
 use support::Aabb;
 use support::bvh::Hierarchy;
@@ -182,7 +182,7 @@ impl Accel {
         };
         let blas = |s: &Slot| Blas::new(device, &format!("trace {:?} {:?}", s.seen, s.kind), flags);
         Self {
-            driver: (tracer != Tracer::Compute).then(|| DriverStructures {
+            driver: (!tracer.has_own_structures()).then(|| DriverStructures {
                 slots: parts.slots.iter().map(blas).collect(),
                 tlas: Tlas::new(device, "trace scene"),
                 placed: None,
@@ -340,7 +340,7 @@ impl Accel {
                     Some(Bottom::Own(_)) | None => 0,
                 }
             }
-            Part::Static(Structure::Own(_)) => 0,
+            Part::Static(Structure::Own(_) | Structure::Grid(_)) => 0,
         };
         let instances: Vec<gpu::Instance> = placed
             .iter()
@@ -386,6 +386,11 @@ impl Accel {
                     triangles: own.triangles.address(),
                     bounds: own.bounds,
                 }),
+                Part::Static(Structure::Grid(grid)) => Some(OwnBottom {
+                    nodes: grid.record.address(),
+                    triangles: grid.triangles.address(),
+                    bounds: grid.bounds,
+                }),
                 Part::Slot(index) => {
                     let indices = self.parts.slots.get(*index).map_or(&[][..], |s| &s.indices);
                     let corners: Vec<[Vec3; 3]> = indices.iter().map(|t| t.map(position)).collect();
@@ -414,6 +419,10 @@ impl Accel {
             let Some(own) = found else {
                 continue; // without a triangle
             };
+            let structure = match p.part {
+                Part::Static(Structure::Grid(_)) => INSTANCE_GRID,
+                _ => 0,
+            };
             let inverse = p.axis.inverse();
             boxes.push(Aabb::of(
                 own.bounds.corners().map(|c| p.axis * c + p.origin),
@@ -423,7 +432,7 @@ impl Accel {
                 triangles: own.triangles,
                 to_object: rows(inverse, -(inverse * p.origin)),
                 geometry: p.record,
-                mask: u32::from(p.mask),
+                mask: u32::from(p.mask) | structure,
             });
         }
         let top = Hierarchy::new(&boxes, INSTANCES);

@@ -111,20 +111,28 @@ fn quantize(children: &[Child]) -> BvhNode {
     node
 }
 
+/// A triangle of the first geometry.
+fn triangle([a, b, c]: [Vec3; 3], primitive: u32) -> BvhTriangle {
+    BvhTriangle {
+        a,
+        b,
+        c,
+        primitive,
+        part: 0,
+        padding: 0,
+    }
+}
+
 /// The triangles of a hierarchy in the order of its leafs.
 pub fn ordered(hierarchy: &Hierarchy, corners: &[[Vec3; 3]]) -> Vec<BvhTriangle> {
-    let triangle = |&primitive: &u32| {
-        let [a, b, c] = *corners.get(primitive as usize)?;
-        Some(BvhTriangle {
-            a,
-            b,
-            c,
-            primitive,
-            part: 0,
-            padding: 0,
-        })
-    };
-    hierarchy.order().iter().filter_map(triangle).collect()
+    let of = |&number: &u32| Some(triangle(*corners.get(number as usize)?, number));
+    hierarchy.order().iter().filter_map(of).collect()
+}
+
+/// The triangles in their own order.
+pub fn unordered(corners: &[[Vec3; 3]]) -> Vec<BvhTriangle> {
+    let numbered = (0..).zip(corners);
+    numbered.map(|(number, &c)| triangle(c, number)).collect()
 }
 
 /// A hierarchy over triangles, with the triangles in leaf order.

@@ -3,9 +3,10 @@
 
 use std::collections::{BTreeMap, HashSet};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
 
 use glam::{Vec2, Vec3};
-use shaders::trace_types::SkyRecord;
+use shaders::trace_types::{BvhTriangle, SkyRecord};
 use shaders::types::Triangle;
 use shaders::types::constants::{
     NO_TEXTURE, TRIANGLE_CURVED, TRIANGLE_ONE_SIDED, TRIANGLE_SOLID, TRIANGLE_STATIC,
@@ -15,9 +16,10 @@ use support::Aabb;
 use support::slice;
 
 use super::beyond_sky::MapSkies;
-use super::bvh::build_triangles;
+use super::bvh::{build_triangles, unordered};
 use super::cutout::Coverage;
 use super::doubled::doubled;
+use super::grid::{self, GridStructure};
 use super::input::{Kind, MaterialInfo, MaterialTable, StaticScene, StaticSurface};
 use super::layer_boxes::{StaticLayer, bounds_of};
 use super::lifted::lifted;
@@ -26,6 +28,7 @@ use super::solids::solid_surfaces;
 use super::surroundings::Surroundings;
 use super::tracer::Tracer;
 use crate::gpu::{Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error};
+use crate::statistics::StructureCost;
 
 /// Triangles of one kind.
 pub struct StaticPart {
@@ -46,12 +49,25 @@ pub struct StaticBlas {
     pub structure: Structure,
 }
 
-/// An acceleration structure of either tracer.
+/// An acceleration structure.
 pub enum Structure {
     /// The driver's structure, for the ray tracing pipeline and ray queries.
     Driver(Blas),
-    /// Our own hierarchy, for the compute tracer.
+    /// Our own hierarchy, for the compute and the grid tracer.
     Own(OwnStructure),
+    /// A uniform grid, for the grid tracer.
+    Grid(GridStructure),
+}
+
+impl Structure {
+    /// Bytes on the device.
+    fn bytes(&self) -> u64 {
+        match self {
+            Self::Driver(blas) => blas.size(),
+            Self::Own(own) => own.nodes.size() + own.triangles.size(),
+            Self::Grid(grid) => grid.bytes(),
+        }
+    }
 }
 
 /// A hierarchy on the GPU.
@@ -90,6 +106,8 @@ pub struct StaticGeometry {
     pub mirrors: Mirrors,
     /// Surfaces that filter light, and liquids; empty unless the caller sets them.
     pub surroundings: Surroundings,
+    /// Cost of the structures.
+    pub cost: StructureCost,
     /// Records of the structures' triangles, which shaders read by address.
     #[cfg_attr(not(test), expect(dead_code, reason = "only kept alive"))]
     triangle_records: Buffer,
@@ -279,20 +297,16 @@ impl StaticGeometry {
     /// Bytes of the structures and of the triangle records.
     #[cfg(test)]
     pub fn bytes(&self) -> u64 {
-        let structure = |part: &StaticBlas| match &part.structure {
-            Structure::Driver(blas) => blas.size(),
-            Structure::Own(own) => own.nodes.size() + own.triangles.size(),
-        };
-        self.structures.iter().map(structure).sum::<u64>() + self.triangle_records.size()
+        self.cost.bytes + self.triangle_records.size()
     }
 
-    /// Builds the structures of a map; returns when the GPU has built them.
+    /// Builds the structures of a map; returns when the GPU has built them. `grid_cells`: `rt_gridCells`.
     ///
     /// # Errors
     /// Out of memory, or a lost device.
     pub fn new(
         device: &Device,
-        tracer: Tracer,
+        (tracer, grid_cells): (Tracer, u32),
         scene: &StaticScene<'_>,
         materials: &dyn MaterialTable,
     ) -> Result<Self, Error> {
@@ -305,16 +319,31 @@ impl StaticGeometry {
             &grouped.triangles,
         )?;
         let positions = lifted(scene, materials);
+        let begin = Instant::now();
         let structures = match tracer {
             Tracer::Pipeline | Tracer::Query => {
                 driver_structures(device, &positions, &grouped, &triangles)?
             }
-            Tracer::Compute => own_structures(device, &positions, &grouped, &triangles)?,
+            Tracer::Compute => own_structures(device, &positions, &grouped, &triangles, None)?,
+            Tracer::Grid => {
+                own_structures(device, &positions, &grouped, &triangles, Some(grid_cells))?
+            }
+        };
+        let grids = structures.iter().filter_map(|s| match &s.structure {
+            Structure::Grid(grid) => Some(grid.cells),
+            _ => None,
+        });
+        let cost = StructureCost {
+            build_ms: begin.elapsed().as_secs_f64() * 1e3,
+            bytes: structures.iter().map(|s| s.structure.bytes()).sum(),
+            triangles: grouped.triangles.len(),
+            cells: grids.into_iter().next(),
         };
         static SERIALS: AtomicU64 = AtomicU64::new(1);
         Ok(Self {
             serial: SERIALS.fetch_add(1, Ordering::Relaxed),
             structures,
+            cost,
             vertices: scene.vertex_address,
             relief: scene.relief_address,
             skies: Buffer::with_data(device, "trace skies", storage, &grouped.skies)?,
@@ -388,12 +417,13 @@ fn driver_structures(
         .collect())
 }
 
-/// Structures of our own.
+/// Structures of our own. `grid`: what stops rays in the map itself has a grid of so many cells; 0 chooses them.
 fn own_structures(
     device: &Device,
     positions: &[Vec3],
     grouped: &Grouped,
     triangles: &Buffer,
+    grid: Option<u32>,
 ) -> Result<Vec<StaticBlas>, Error> {
     let mut structures = Vec::new();
     let position = |i: u32| positions.get(i as usize).copied().unwrap_or(Vec3::ZERO);
@@ -402,7 +432,7 @@ fn own_structures(
         let members = together.entry((*model, Together::of(*kind)));
         members.or_default().push((*kind, group));
     }
-    for ((model, _), groups) in together {
+    for ((model, kinds), groups) in together {
         // geometry of each triangle, counted from the first, and its number in the geometry
         let mut places: Vec<[u32; 2]> = Vec::new();
         let mut corners: Vec<[Vec3; 3]> = Vec::new();
@@ -411,15 +441,39 @@ fn own_structures(
             places.extend((0..).zip(members).map(|(primitive, _)| [part, primitive]));
             corners.extend(members.iter().map(|t| t.indices.map(position)));
         }
-        let Some(mut hierarchy) = build_triangles(&corners) else {
-            continue; // no triangle has an area
-        };
-        for triangle in &mut hierarchy.triangles {
-            if let Some(&[part, primitive]) = places.get(triangle.primitive as usize) {
-                (triangle.part, triangle.primitive) = (part, primitive);
+        let name = |triangles: &mut [BvhTriangle]| {
+            for triangle in triangles {
+                if let Some(&[part, primitive]) = places.get(triangle.primitive as usize) {
+                    (triangle.part, triangle.primitive) = (part, primitive);
+                }
             }
-        }
-        let storage = BufferUsage::STORAGE;
+        };
+        let grid = match grid.filter(|_| model == 0 && kinds == Together::Solid) {
+            Some(cells) => grid::build(&corners, cells)
+                .inspect_err(|why| log::warn!("rt_tracer grid: {why}; the map has a hierarchy"))
+                .ok(),
+            None => None,
+        };
+        let structure = match grid {
+            Some(grid) => {
+                let mut triangles = unordered(&corners);
+                name(&mut triangles);
+                Structure::Grid(GridStructure::new(device, &grid, &triangles)?)
+            }
+            None => {
+                let Some(mut hierarchy) = build_triangles(&corners) else {
+                    continue; // no triangle has an area
+                };
+                name(&mut hierarchy.triangles);
+                let storage = BufferUsage::STORAGE;
+                let leafs = &hierarchy.triangles;
+                Structure::Own(OwnStructure {
+                    nodes: Buffer::with_data(device, "trace nodes", storage, &hierarchy.nodes)?,
+                    triangles: Buffer::with_data(device, "trace leafs", storage, leafs)?,
+                    bounds: hierarchy.bounds,
+                })
+            }
+        };
         let part = |(kind, group): &(Kind, &Group)| StaticPart {
             kind: *kind,
             triangles: triangles.address() + (group.first * size_of::<Triangle>()) as u64,
@@ -427,11 +481,7 @@ fn own_structures(
         structures.push(StaticBlas {
             model,
             parts: groups.iter().map(part).collect(),
-            structure: Structure::Own(OwnStructure {
-                nodes: Buffer::with_data(device, "trace nodes", storage, &hierarchy.nodes)?,
-                triangles: Buffer::with_data(device, "trace leafs", storage, &hierarchy.triangles)?,
-                bounds: hierarchy.bounds,
-            }),
+            structure,
         });
     }
     Ok(structures)

@@ -29,6 +29,7 @@ use crate::gpu::{ColorMask, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
 use crate::scene::TracedScene;
 use crate::settings::Settings;
+use crate::statistics::StructureCost;
 use crate::world::World;
 
 /// Sort value of the engine's first class of blended surfaces (`SS_BLEND0`).
@@ -127,13 +128,13 @@ fn static_scene<'a>(world: &'a World, fogs: &'a [Fog]) -> StaticScene<'a> {
 /// Acceleration structures of the map's constant geometry.
 fn geometry(
     device: &Device,
-    tracer: Tracer,
+    structures: (Tracer, u32),
     world: &World,
     fogs: &[Fog],
     assets: &Assets,
     sight: &Sight,
 ) -> Result<StaticGeometry, Error> {
-    let mut geometry = StaticGeometry::new(device, tracer, &static_scene(world, fogs), assets)?;
+    let mut geometry = StaticGeometry::new(device, structures, &static_scene(world, fogs), assets)?;
     geometry.surroundings = Surroundings::new(device, world, assets)?;
     geometry.mirrors.find_reach(device, sight)?;
     Ok(geometry)
@@ -207,6 +208,8 @@ pub struct TraceLook {
     /// Tracer of the right eye in stereo; each eye has its own history.
     right: Option<Box<ViewTracer>>,
     passes: Arc<PassSet>,
+    /// `rt_gridCells`.
+    grid_cells: u32,
     geometry: StaticGeometry,
     /// The map's fog volumes, with their mean light.
     fogs: Vec<Fog>,
@@ -216,11 +219,16 @@ pub struct TraceLook {
 }
 
 impl TraceLook {
-    /// Builds the map's acceleration structures and light lists.
+    /// Builds the map's acceleration structures and light lists. `grid_cells`: `rt_gridCells`.
     ///
     /// # Errors
     /// The device is out of memory or lost.
-    pub fn new(passes: &Arc<PassSet>, world: &World, assets: &Assets) -> Result<Self, Error> {
+    pub fn new(
+        passes: &Arc<PassSet>,
+        grid_cells: u32,
+        world: &World,
+        assets: &Assets,
+    ) -> Result<Self, Error> {
         let (device, tracer) = (passes.device(), passes.tracer());
         let mut view_tracer = ViewTracer::new(passes)?;
         let exposure = world.data.relit.display_exposure();
@@ -229,13 +237,15 @@ impl TraceLook {
             let fogs = fog_light::lit(&world.data.fogs, source);
             Ok((fogs, MapLights::new(device, source)?))
         })?;
-        let geometry = geometry(device, tracer, world, &fogs, assets, &lights.sight)?;
+        let structures = (tracer, grid_cells);
+        let geometry = geometry(device, structures, world, &fogs, assets, &lights.sight)?;
         lights.white = exposure.scale.recip();
         lights.find_fogs(&geometry.fog_boxes);
         Ok(Self {
             tracer: view_tracer,
             right: None,
             passes: Arc::clone(passes),
+            grid_cells,
             geometry,
             fogs,
             lights,
@@ -308,7 +318,7 @@ impl TraceLook {
             // triangles store their materials; a game remaps when a flag or a button changes its look
             self.geometry = geometry(
                 rec.device(),
-                self.tracer(),
+                (self.tracer(), self.grid_cells),
                 world,
                 &self.fogs,
                 assets,
@@ -395,6 +405,11 @@ impl TraceLook {
     /// Rays of a pass in the newest finished frame; `None` for a pass without a counter, or while rays are not counted.
     pub fn rays(&self, pass: &str) -> Option<u64> {
         self.tracer.rays()?.get(counter_of(pass)?).copied()
+    }
+
+    /// Cost of the structures of the map's constant geometry.
+    pub fn structure_cost(&self) -> StructureCost {
+        self.geometry.cost
     }
 
     /// Bytes of the acceleration structures, by content.

@@ -24,6 +24,7 @@ mod fog_light;
 mod frame_lights;
 pub mod frame_passes;
 pub mod geometry;
+mod grid;
 mod indirect;
 pub mod input;
 pub mod layer_boxes;

@@ -73,6 +73,7 @@ impl PassSet {
         match (row.shader, self.tracer) {
             (Shader::Compute(spirv), _) => compute(spirv),
             (Shader::Rays(rays), Tracer::Compute) => compute(rays.compute),
+            (Shader::Rays(rays), Tracer::Grid) => compute(rays.grid),
             (Shader::Rays(rays), Tracer::Query) => compute(rays.query),
             (Shader::Rays(rays), Tracer::Pipeline) => {
                 let any_hit = |any_hit| HitGroup {

@@ -12,15 +12,25 @@ pub enum Tracer {
     Query,
     /// Our own hierarchies in compute shaders: on any device, and faster on devices that trace in software.
     Compute,
+    /// The same with a uniform grid for what stops rays in the map, as on the GPUs of 2005; for comparisons.
+    Grid,
 }
 
 impl Tracer {
+    /// Whether its structures are ours, and not the driver's.
+    pub fn has_own_structures(self) -> bool {
+        match self {
+            Self::Pipeline | Self::Query => false,
+            Self::Compute | Self::Grid => true,
+        }
+    }
+
     /// Whether a device supports this tracer.
     pub fn is_possible(self, info: &DeviceInfo) -> bool {
         match self {
             Self::Pipeline => info.ray_tracing.is_some(),
             Self::Query => info.ray_query,
-            Self::Compute => true,
+            Self::Compute | Self::Grid => true,
         }
     }
 
@@ -32,7 +42,7 @@ impl Tracer {
             let name = match wished {
                 Self::Pipeline => "ray tracing pipelines",
                 Self::Query => "ray queries",
-                Self::Compute => "compute",
+                Self::Compute | Self::Grid => "compute",
             };
             log::warn!("rt_tracer: {} has no {name}; {found:?} is used", info.name);
         }
@@ -45,6 +55,7 @@ impl Tracer {
             TracerChoice::Pipeline => Some(Self::Pipeline),
             TracerChoice::Query => Some(Self::Query),
             TracerChoice::Compute => Some(Self::Compute),
+            TracerChoice::Grid => Some(Self::Grid),
         }
     }
 
@@ -69,9 +80,9 @@ mod tests {
 
     #[test]
     fn an_unsupported_tracer_falls_back_to_the_fastest() {
-        use Tracer::{Compute, Pipeline, Query};
+        use Tracer::{Compute, Grid, Pipeline, Query};
         use TracerChoice as W;
-        let (none, both) = (&[Compute][..], &[Pipeline, Query, Compute]);
+        let (none, both) = (&[Compute, Grid][..], &[Pipeline, Query, Compute, Grid]);
         let (query, pipeline) = (&[Query, Compute], &[Pipeline, Compute]);
         for (device, software, wish, found) in [
             (none, false, W::Auto, Compute),
@@ -80,6 +91,8 @@ mod tests {
             (both, false, W::Auto, Pipeline),
             (both, false, W::Query, Query),
             (both, false, W::Compute, Compute),
+            (both, false, W::Grid, Grid),
+            (none, true, W::Grid, Grid),
             (query, false, W::Auto, Query),
             (query, false, W::Pipeline, Query),
             (pipeline, false, W::Auto, Compute),

@@ -44,6 +44,9 @@ pub const BVH_FIRST: u32 = 0x0FFF_FFFF;
 /// Size of the traversal stack of one level, entries.
 pub const BVH_STACK: u32 = 48;
 
+/// Bit of `BvhInstance::mask` above those of the masks of rays: the instance has a grid.
+pub const INSTANCE_GRID: u32 = 0x100;
+
 /// Masks of top-level instances.
 pub const MASK_SOLID: u8 = 0x01;
 pub const MASK_TRANSLUCENT: u8 = 0x02;

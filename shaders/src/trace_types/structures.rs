@@ -81,11 +81,30 @@ pub struct BvhTriangle {
     pub padding: u32,
 }
 
+/// A uniform grid of cubic cells over the triangles of an instance.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct GridRecord {
+    /// For each cell (x changes fastest, z slowest) the place of its first entry, `u32`; at the end the number of
+    /// entries.
+    pub starts: u64,
+    /// Indices of [`BvhTriangle`]s, cell by cell, `u32`.
+    pub entries: u64,
+    /// Least corner of the first cell, in the space of the instance.
+    pub origin: Vec3,
+    /// Edge of a cell.
+    pub edge: f32,
+    /// Cells along each axis, at least 1.
+    pub counts: [u32; 3],
+    /// Makes the size a multiple of 8 bytes.
+    pub padding: u32,
+}
+
 /// An instance of a hierarchy, in the order of the top hierarchy's leaves.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct BvhInstance {
-    /// Its [`BvhNode`]s.
+    /// Its [`BvhNode`]s; with `INSTANCE_GRID` in `mask`, its [`GridRecord`].
     pub nodes: u64,
     /// Its [`BvhTriangle`]s.
     pub triangles: u64,
@@ -93,6 +112,6 @@ pub struct BvhInstance {
     pub to_object: [[f32; 4]; 3],
     /// Index of its first geometry record.
     pub geometry: u32,
-    /// A ray tests the instance if their masks share a bit.
+    /// A ray tests the instance if their masks share a bit; and `INSTANCE_GRID`.
     pub mask: u32,
 }

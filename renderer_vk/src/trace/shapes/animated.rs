@@ -87,7 +87,7 @@ impl AnimatedShape {
         old: Option<Self>,
     ) -> Result<Self, Error> {
         let indices = part_indices(meshes);
-        let index_buffer = if tracer == Tracer::Compute {
+        let index_buffer = if tracer.has_own_structures() {
             None
         } else {
             let name = "trace animated indices";

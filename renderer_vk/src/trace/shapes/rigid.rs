@@ -57,7 +57,7 @@ impl RigidShape {
             at
         };
         let name = "trace rigid";
-        if tracer == Tracer::Compute {
+        if tracer.has_own_structures() {
             let corners = part_corners(&vertices, &indices);
             let built = build_triangles(&corners);
             let places = built.as_ref().map(|h| {

@@ -94,7 +94,8 @@ impl Game {
         frames: u32,
     ) -> (Vec<u8>, TraceLook) {
         let device = &self.gpu.device;
-        let mut look = TraceLook::new(passes, world, assets).expect("structures");
+        let mut look =
+            TraceLook::new(passes, settings.rt_grid_cells, world, assets).expect("structures");
         compile_ahead(passes, settings, look.needs(world, assets)).expect("pipelines");
         let ahead = device.compiled_pipelines();
         assets
@@ -212,6 +213,7 @@ fn tracers_agree_on_maps() {
             TracerChoice::Pipeline,
             TracerChoice::Query,
             TracerChoice::Compute,
+            TracerChoice::Grid,
         ] {
             let settings = Settings {
                 rt: true,
@@ -251,7 +253,7 @@ fn tracers_agree_on_maps() {
         };
         let lit = pictures[0].chunks_exact(4).filter(|p| p[1] > 8).count();
         assert!(lit > 100, "{map}: {lit}");
-        for (other, name) in pictures[1..].iter().zip(["query", "compute"]) {
+        for (other, name) in pictures[1..].iter().zip(["query", "compute", "grid"]) {
             let count = differing(other);
             println!("{map}: {count} of {} differ with {name}", 64 * 48);
             // rays that graze an edge may hit or miss it, with all consequences

@@ -10,6 +10,7 @@ mod denoising;
 mod dielectrics;
 mod fog;
 mod gradients;
+mod grids;
 mod harness;
 mod inspection;
 mod layers;

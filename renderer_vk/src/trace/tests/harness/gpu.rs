@@ -84,12 +84,18 @@ impl Gpu {
         }
     }
 
-    /// Runs a test of ray traversal with every tracer that the device supports.
+    /// Runs a test of ray traversal with every tracer that the device supports; with the grid tracer, which shares all
+    /// but the walk with the compute tracer, only if `RELIGHT_FULL=1`.
     pub fn each(test: fn(&mut Gpu)) {
-        Self::with(
-            &[Tracer::Pipeline, Tracer::Query, Tracer::Compute],
-            |mut gpu| test(&mut gpu),
-        );
+        let all = [
+            Tracer::Pipeline,
+            Tracer::Query,
+            Tracer::Compute,
+            Tracer::Grid,
+        ];
+        let full = testkit::is_set("RELIGHT_FULL");
+        let tracers = if full { &all[..] } else { &all[..3] };
+        Self::with(tracers, |mut gpu| test(&mut gpu));
     }
 
     /// Runs a test with each of `tracers` that the device supports. Without any of them, the test is skipped.
@@ -146,7 +152,7 @@ impl Gpu {
         let options = DeviceOptions {
             validation: true,
             // with the tracer's extensions disabled, to prove that it needs none
-            allow_ray_tracing: tracer != Tracer::Compute,
+            allow_ray_tracing: !tracer.has_own_structures(),
             ..DeviceOptions::default()
         };
         let device = match Device::new(&options, SurfaceSource::Headless) {

@@ -51,6 +51,8 @@ pub struct Scene {
     pub dlights: Vec<DynamicLight>,
     /// The map's tree with its light lists; without it, all lights reach all points.
     pub tree: Option<(q3bsp::Bsp, LightLists)>,
+    /// `rt_gridCells`.
+    pub grid_cells: u32,
     pub def: RefDef,
 }
 
@@ -91,6 +93,7 @@ impl Scene {
             portals: Vec::new(),
             dlights: Vec::new(),
             tree: None,
+            grid_cells: 0,
             def: RefDef {
                 width: size,
                 height: size,
@@ -417,7 +420,8 @@ impl Scene {
             fogs: &self.fogs,
         };
         let mut geometry =
-            StaticGeometry::new(device, tracer, &scene, &materials).expect("structures");
+            StaticGeometry::new(device, (tracer, self.grid_cells), &scene, &materials)
+                .expect("structures");
         geometry.surroundings =
             Surroundings::of_boxes(device, self.filters.clone()).expect("boxes");
         Uploaded {
