@@ -7,6 +7,7 @@ mod light_lists;
 mod looks;
 mod measure;
 mod statistics;
+mod tracers;
 
 use std::process::ExitCode;
 
@@ -15,7 +16,7 @@ use clap::{Parser, Subcommand};
 
 use crate::outcome::parse;
 
-/// Measurements of Relight's renderer: light sampling, light lists, denoising, brightness
+/// Measurements of Relight's renderer: light sampling, light lists, denoising, brightness, tracers
 #[derive(Parser, Debug)]
 #[command(name = "relight-lab", version)]
 pub struct Cli {
@@ -31,6 +32,7 @@ enum Command {
     LightLists(light_lists::LightListsArgs),
     Looks(looks::LooksArgs),
     Measure(measure::MeasureArgs),
+    Tracers(tracers::TracersArgs),
 }
 
 /// Names of earlier versions: subcommand, option, replacement.
@@ -50,6 +52,7 @@ pub fn run() -> Result<ExitCode> {
         Command::LightLists(args) => light_lists::run(&args),
         Command::Looks(args) => looks::run(&args),
         Command::Measure(args) => measure::run(&args),
+        Command::Tracers(args) => tracers::run(&args),
     }?;
     Ok(ExitCode::SUCCESS)
 }

@@ -150,6 +150,8 @@ fn numbers_that_make_no_sense_are_refused() {
         ("estimators", "--view", "0,0", "X,Y,Z,YAW,PITCH"),
         ("light-lists", "--rays", "0", "0 is not in 1.."),
         ("light-lists", "--clusters", "0", "of at least 1"),
+        ("tracers", "--made", "13", "13 is not in 14.."),
+        ("tracers", "--tracer", "grid=257", "grid=CELLS"),
         ("looks", "--views", "0", "of at least 1"),
         ("looks", "--frames", "0", "0 is not in 1.."),
     ] {

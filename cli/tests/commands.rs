@@ -47,6 +47,7 @@ fn help_lists_the_commands_of_users_and_those_of_the_lab_apart() {
         "light-lists",
         "looks",
         "measure",
+        "tracers",
         "help",
     ];
     assert_eq!(listed(LAB), lab);

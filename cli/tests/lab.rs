@@ -165,6 +165,38 @@ fn costs_grow_along_an_axis() {
 }
 
 #[test]
+fn tracers_are_compared() {
+    if !has_device() {
+        return;
+    }
+    let folder = room();
+    // one set of passes: a software driver takes long to compile them
+    let arguments = "tracers room.bsp --made 36 -o out.json --size 32x32 --frames 4 --runs 2 --tracer grid=20 --tracer grid";
+    let arguments: Vec<&str> = arguments.split(' ').collect();
+    let printed = run(LAB, folder.path(), &arguments);
+    let text = std::fs::read_to_string(folder.path().join("out.json")).unwrap();
+    let report: Value = serde_json::from_str(&text).unwrap();
+    let rows = report["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 4);
+    for (row, tracer) in rows.iter().zip(["grid 20", "grid"].iter().cycle()) {
+        assert_eq!(row["tracer"], *tracer);
+        assert_eq!(row["build_ms"].as_array().map(Vec::len), Some(2));
+        assert!(row["bytes"].as_u64() > Some(500), "{row}");
+        // nothing in the map gathers bounced light
+        let passes = if row["scene"] == "room" { 1 } else { 3 };
+        for rates in row["mrays"].as_array().unwrap().iter().take(passes) {
+            let rates = rates.as_array().unwrap();
+            assert_eq!(rates.len(), 2);
+            assert!(rates.iter().all(|rate| rate.as_f64() > Some(0.0)), "{row}");
+        }
+    }
+    assert_eq!(rows[2]["cells"][0], 20);
+    assert_eq!(rows[2]["triangles"], 36);
+    let table = String::from_utf8_lossy(&printed.stdout);
+    assert_eq!(table.matches("| made 36 |").count(), 2, "{table}");
+}
+
+#[test]
 fn pictures_after_a_cut_and_of_a_walk_are_compared_with_the_reference() {
     if !has_device() {
         return;
