@@ -3,6 +3,7 @@
 
 usage: lab/run.py [options]      (lab/README.md describes the file)
        lab/run.py --from-notes   one file for each measured version of the calibration note in git's history
+       lab/run.py --from-tracers FILE   the file of relight-lab tracers -o FILE
 
 The command `relight` must be built from the commit: target/release/relight, or RELIGHT in the environment.
 """
@@ -146,9 +147,29 @@ def from_notes():
         })
 
 
+def from_tracers(given):
+    report = json.loads(Path(given.from_tracers).read_text())
+    commit = git("rev-parse", given.commit or "HEAD")
+    metrics = []
+    for row in report["rows"]:
+        where = f"{row['scene']} {report['size'][0]}x{report['size'][1]}, {row['tracer']}"
+        for name, values in zip(["eye rays", "bounce rays", "light rays"], row["mrays"]):
+            metrics += [metric(name, where, "Mrays/s", "runs", values)] if values else []
+        metrics.append(metric("build of the map's structures", where, "ms", "runs", row["build_ms"]))
+        metrics.append(metric("structures of the map", where, "bytes", "maps", [row["bytes"]]))
+    write(given.label, {
+        "commit": commit, "date": git("log", "-1", "--format=%cI", commit), "measured": date.today().isoformat(),
+        "device": given.machine or report["device"],
+        "command": f"relight-lab tracers MAP… --size {report['size'][0]}x{report['size'][1]} --frames {report['frames']} "
+                   f"--runs {report['runs']} -o FILE; lab/run.py --from-tracers FILE",
+        "source": None, "metrics": metrics,
+    })
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--from-notes", action="store_true", help="read measured tables out of git's history")
+    parser.add_argument("--from-tracers", metavar="FILE", help="read the file of relight-lab tracers -o FILE")
     parser.add_argument("--commit", help="the commit that the command is built from (default: HEAD, with unchanged sources)")
     parser.add_argument("--maps", nargs="+", default=["oasago2", "oa_dm1"], help="maps to calibrate; the first is also drawn")
     parser.add_argument("--runs", type=int, default=5, help="runs of each time, seeds of each calibration (default 5)")
@@ -160,7 +181,12 @@ def main():
     parser.add_argument("--machine", help="device and driver as the chart names them (default: Vulkan's name of the device)")
     parser.add_argument("--label", default="run", help="end of the file's name, for several devices")
     given = parser.parse_args()
-    from_notes() if given.from_notes else measure(given)
+    if given.from_notes:
+        from_notes()
+    elif given.from_tracers:
+        from_tracers(given)
+    else:
+        measure(given)
 
 
 if __name__ == "__main__":

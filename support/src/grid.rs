@@ -512,6 +512,58 @@ mod tests {
     }
 
     #[test]
+    fn walks_along_boundaries_of_cells_miss_nothing() {
+        let mut random = Random::new(31);
+        let centre = Vec3::new(900.0, -2000.0, 70.0);
+        let half = Vec3::new(310.0, 250.0, 130.0);
+        let bounds = Aabb::new(centre - half, centre + half);
+        let layout = Layout::around(bounds, 13).expect("finite");
+        let inner = (layout.counts - 1).as_vec3();
+        let boundary = |random: &mut Random, reach: f32| {
+            let place = [0; 3].map(|_| random.uniform());
+            layout.origin
+                + (Vec3::ONE + (Vec3::from(place) * (inner - 1.0) * reach).round()) * layout.edge
+        };
+        // corners at corners of cells; many triangles lie in planes between cells
+        let corners: Vec<[Vec3; 3]> = (0..250)
+            .map(|number| {
+                let first = boundary(&mut random, 1.0);
+                let mut corners = [first; 3];
+                for corner in corners.iter_mut().skip(1) {
+                    let away = random.signed_point() * 2.6 * layout.edge;
+                    *corner = first + (away / layout.edge).round() * layout.edge;
+                }
+                if number % 2 == 0 {
+                    let axis = number / 2 % 3;
+                    corners.iter_mut().for_each(|c| c[axis] = first[axis]);
+                }
+                corners.map(|c| c.clamp(bounds.mins, bounds.maxs))
+            })
+            .collect();
+        let grid = Grid::new(&corners, layout, usize::MAX).expect("small");
+        let mut hits = 0;
+        for ray in 0..4000 {
+            let origin = boundary(&mut random, 1.0);
+            let mut direction = (boundary(&mut random, 1.0) - origin) / layout.edge;
+            match ray % 4 {
+                // in a plane of boundaries, and along an edge of cells
+                0 => direction[ray / 4 % 3] = 0.0,
+                1 => direction = [Vec3::X, Vec3::NEG_Z, Vec3::Y][ray / 4 % 3],
+                _ => {}
+            }
+            if direction == Vec3::ZERO {
+                continue;
+            }
+            let all = corners.iter().filter_map(|&c| hit(origin, direction, c));
+            let expected = all.reduce(f64::min);
+            let (found, _) = walk(&grid, &corners, origin, direction);
+            assert_eq!(found, expected, "{ray}: {origin} {direction}");
+            hits += usize::from(found.is_some());
+        }
+        assert!(hits > 1000, "{hits}");
+    }
+
+    #[test]
     fn odd_boxes_and_triangles_are_borne() {
         let [x, y] = [Vec3::X * 40.0, Vec3::Y * 40.0];
         // one flat triangle, one without area, one that is not finite

@@ -33,7 +33,8 @@ use crate::view::{Camera, draw, load, map_name, open};
 /// Draws maps and made-up scenes of stated numbers of triangles with each tracer: the driver's pipelines and queries,
 /// our hierarchies, uniform grids of several sizes. Prints a table with the median, the least and the most of the runs:
 /// milliseconds until the structures of the map are on the device, their bytes, millions of rays a second of the camera,
-/// of a bounce and to lights. Rays are counted in all frames.
+/// of a bounce and to lights, and the ratios of the first two to our hierarchies' within each run. Rays are counted in
+/// all frames.
 ///
 /// Examples: relight-lab tracers oa_dm1 oacmpctf2 -o out/tracers.json;
 /// relight-lab tracers --made 36,2064,61562 --size 256x256 --tracer compute --tracer grid=64

@@ -55,8 +55,8 @@ impl Row {
         }
     }
 
-    /// As a row of a table.
-    fn line(&self) -> String {
+    /// As a row of a table. `hierarchy`: our hierarchies on the same map.
+    fn line(&self, hierarchy: Option<&Self>) -> String {
         let cells = match self.cells {
             Some([x, y, z]) => format!("{x}×{y}×{z}"),
             None => "–".to_owned(),
@@ -64,12 +64,24 @@ impl Row {
         #[allow(clippy::cast_precision_loss)] // a rounded value for reports
         let kib = self.bytes as f64 / 1024.0;
         let [eye, bounce, lights] = self.mrays.each_ref().map(|values| spread(values));
+        let over = |pass: usize| {
+            let of = |row: &Self| row.mrays.get(pass).cloned().unwrap_or_default();
+            let pairs = of(self)
+                .into_iter()
+                .zip(hierarchy.map(of).unwrap_or_default());
+            let ratios: Vec<f64> = pairs
+                .map(|(a, b)| (a / b * 100.0).round() / 100.0)
+                .collect();
+            spread(&ratios)
+        };
         format!(
-            "| {} | {} | {} | {cells} | {} | {kib:.0} | {eye} | {bounce} | {lights} |",
+            "| {} | {} | {} | {cells} | {} | {kib:.0} | {eye} | {bounce} | {lights} | {} | {} |",
             self.scene,
             self.triangles,
             self.tracer,
             spread(&self.build_ms),
+            over(0),
+            over(1),
         )
     }
 }
@@ -93,7 +105,7 @@ impl Report {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }
 
-    /// As a table in Markdown: median, in brackets the least and the most of the runs.
+    /// As a table in Markdown: median, least and most of the runs. The ratios are those within each run.
     pub fn lines(&self) -> Vec<String> {
         let (width, height) = self.size;
         let mut lines = vec![
@@ -102,10 +114,13 @@ impl Report {
                 self.device, self.runs, self.frames
             ),
             String::new(),
-            "| scene | triangles | tracer | cells | build ms | KiB | eye Mrays/s | bounce Mrays/s | light Mrays/s |".into(),
-            "|---|---|---|---|---|---|---|---|---|".into(),
+            "| scene | triangles | tracer | cells | build ms | KiB | eye Mrays/s | bounce Mrays/s | light Mrays/s | eye / compute | bounce / compute |".into(),
+            "|---|---|---|---|---|---|---|---|---|---|---|".into(),
         ];
-        lines.extend(self.rows.iter().map(Row::line));
+        lines.extend(self.rows.iter().map(|row| {
+            let mut rows = self.rows.iter();
+            row.line(rows.find(|other| other.scene == row.scene && other.tracer == "compute"))
+        }));
         lines
     }
 }
@@ -117,7 +132,7 @@ fn rounded(value: f64) -> f64 {
     (value * scale).round() / scale
 }
 
-/// Median, in brackets least and most.
+/// Median, least and most.
 fn spread(values: &[f64]) -> String {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -127,7 +142,7 @@ fn spread(values: &[f64]) -> String {
     };
     match sorted.len() {
         1 => format!("{middle}"),
-        _ => format!("{middle} ({least}–{most})"),
+        _ => format!("{middle}, {least}, {most}"),
     }
 }
 
@@ -155,8 +170,8 @@ mod tests {
         row.join(&run(8.0));
         row.join(&run(2.0));
         assert_eq!(
-            row.line(),
-            "| m | 12 | grid 16 | 16×8×1 | 2 (2–2) | 2 | 500 (125–1000) | 250 (250–250) | – |"
+            row.line(Some(&row)),
+            "| m | 12 | grid 16 | 16×8×1 | 2, 2, 2 | 2 | 500, 125, 1000 | 250, 250, 250 | – | 1, 1, 1 | 1, 1, 1 |"
         );
         assert_eq!(rounded(1234.56), 1235.0);
         assert_eq!(rounded(0.012_345), 0.01235);

@@ -106,6 +106,22 @@ fn grids_show_what_hierarchies_show() {
 }
 
 #[test]
+fn a_map_that_fits_no_grid_has_a_hierarchy() {
+    let Some(mut gpu) = Gpu::new(Tracer::Grid) else {
+        return;
+    };
+    let mut scene = Scene::hall(20.0, 0.5, 32);
+    scene.sun(Vec3::new(0.0, 0.6, 0.8), 3.0, 0.01);
+    scene.lamp(Vec3::new(0.0, 60.0, 110.0), 60.0, Vec3::splat(12.0));
+    let picture = gpu.render(&scene, &reference(), 2).0;
+    let far = Vec3::splat(2.0e7);
+    scene.quad(rectangle(far, Vec3::X * 1.0e6, Vec3::Y * 1.0e6), 0);
+    let cost = scene.upload(&gpu.device, gpu.tracer).geometry.cost;
+    assert_eq!(cost.cells, None);
+    assert_eq!(gpu.render(&scene, &reference(), 2).0, picture);
+}
+
+#[test]
 fn flat_maps_have_grids() {
     // all of the map in one plane, and the camera outside of the grid: rays along an axis, and across the plane
     let flat = |_: &Gpu| {
