@@ -151,17 +151,21 @@ def from_tracers(given):
     report = json.loads(Path(given.from_tracers).read_text())
     commit = git("rev-parse", given.commit or "HEAD")
     metrics = []
+    scenes = list(dict.fromkeys(row["scene"] for row in report["rows"]))
+    maps = [scene for scene in scenes if not scene.startswith("made ")]
+    made = ",".join(scene.removeprefix("made ") for scene in scenes if scene not in maps)
     for row in report["rows"]:
         where = f"{row['scene']} {report['size'][0]}x{report['size'][1]}, {row['tracer']}"
         for name, values in zip(["eye rays", "bounce rays", "light rays"], row["mrays"]):
             metrics += [metric(name, where, "Mrays/s", "runs", values)] if values else []
         metrics.append(metric("build of the map's structures", where, "ms", "runs", row["build_ms"]))
-        metrics.append(metric("structures of the map", where, "bytes", "maps", [row["bytes"]]))
+        metrics.append(metric("structures of the map", where, "bytes", "runs", [row["bytes"]]))
     write(given.label, {
         "commit": commit, "date": git("log", "-1", "--format=%cI", commit), "measured": date.today().isoformat(),
         "device": given.machine or report["device"],
-        "command": f"relight-lab tracers MAP… --size {report['size'][0]}x{report['size'][1]} --frames {report['frames']} "
-                   f"--runs {report['runs']} -o FILE; lab/run.py --from-tracers FILE",
+        "command": " ".join(["relight-lab tracers", *maps, *(["--made", made] if made else []),
+                             f"--size {report['size'][0]}x{report['size'][1]} --views {report['views']} --frames {report['frames']}",
+                             f"--runs {report['runs']} -o FILE; lab/run.py --from-tracers FILE"]),
         "source": None, "metrics": metrics,
     })
 

@@ -86,6 +86,12 @@ TABLES = [
     ("wild-maps", "wild", "| map | pack | triangles | lights", f"map; pack; {WILD}",
      f"{H100}, 16 processor cores; rows ons-reborn, reslimed, silvercity: {LAVAPIPE}", "2026-11-25, two rows 2026-11-26",
      "scripts/wild FOLDER"),
+    ("tracers-lavapipe", "tracers", "| lavapipe | triangles | tracer",
+     "scene; triangles; tracer; cells; build [ms: median, least, most]; structures [KiB]; "
+     "eye rays [million a second: median, least, most]; bounce rays; light rays; "
+     "eye rays over our hierarchies' [ratio within a run: median, least, most]; bounce rays over theirs",
+     f"{LAVAPIPE}, beside other work", "2026-11-28",
+     "relight-lab tracers oa_dm1 oa_koth1 hydronex2 --made 36,2064,61562 --size 256x256 --views 2 --frames 6 --runs 5"),
     ("maps-converted", "maps-table", "| map | pack | triangles | materials",
      "map; pack; triangles; materials; images; size [MiB]; processor time [s]; errors / warnings",
      "processor", "2026-11-22", "scripts/maps-table"),

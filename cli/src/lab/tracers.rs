@@ -189,6 +189,7 @@ pub fn run(args: &TracersArgs) -> Result<()> {
     let mut report = Report {
         device: String::new(),
         size: args.size,
+        views: args.views,
         frames: args.frames,
         runs: args.runs,
         rows: Vec::new(),

@@ -91,6 +91,8 @@ impl Row {
 pub struct Report {
     pub device: String,
     pub size: (u32, u32),
+    /// Views of a map; a made-up scene has one.
+    pub views: usize,
     pub frames: u32,
     pub runs: u32,
     pub rows: Vec<Row>,
@@ -178,6 +180,7 @@ mod tests {
         let report = Report {
             device: "d".into(),
             size: (2, 2),
+            views: 1,
             frames: 1,
             runs: 3,
             rows: vec![row],
