@@ -1,7 +1,7 @@
 // The path of a primary ray through a pixel: its accumulated radiance, and the lit point that the pixel shows.
 #ifndef RELIGHT_TRACE_PATH_GLSL
 #define RELIGHT_TRACE_PATH_GLSL
-#include "trace/specular.glsl"
+#include "trace/interface.glsl"
 #include "trace/sky.glsl"
 #include "trace/random.glsl"
 #include "trace/gbuffer.glsl"
@@ -20,9 +20,6 @@ const float PAINT_DISTANCE = 0.5;
 const uint PATHS_BIT = 8;
 // Weakest reflection that is followed.
 const float MIN_REFLECTION = 1.0 / 256.0;
-
-// How reflection or refraction has distorted a path: not at all; by a static shape; by ripples, which move with time.
-const uint BENT_NOT = 0, BENT_BY_SHAPE = 1, BENT_BY_RIPPLES = 2;
 
 struct Path {
     vec3 origin;

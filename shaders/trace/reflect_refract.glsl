@@ -2,9 +2,8 @@
 #ifndef RELIGHT_TRACE_REFLECT_REFRACT_GLSL
 #define RELIGHT_TRACE_REFLECT_REFRACT_GLSL
 #include "trace/path.glsl"
-#include "trace/dielectric.glsl"
+#include "trace/interface.glsl"
 #include "trace/portal.glsl"
-#include "trace/specular.glsl"
 
 // `PATHS_*` number of paths that pass a portal after `paths`; `scene/turned.rs` numbers them the same way.
 uint paths_through(uint paths, uint portal) {
@@ -88,53 +87,6 @@ bool pass_reflection(inout Path path, SurfacePoint p, Layer layer, float t) {
     return false;
 }
 
-// The surface of glass or a liquid at a point of a path. `face`, `normal`: as for `reflect_path`; `eta`: ratio of the
-// indices of refraction; `bend`: BENT_*.
-struct Interface {
-    vec3 face;
-    vec3 normal;
-    float eta;
-    float mirrored; // share of the light that is reflected
-    uint bend;
-    bool refracts;
-    bool enters;
-    float frost; // width of the distribution of its microfacets; 0: smooth
-};
-
-// Whether glass is frosted: while frames accumulate. Live frames show it clear, because pixels that see another surface each
-// frame, or each another one than its neighbour, have neither history nor neighbours to filter with.
-bool is_frosted(Material material) {
-    return HAS_GLOSS != 0 && (material.flags & MATERIAL_ROUGH) != 0 && (VIEW.flags & VIEW_ACCUMULATE) != 0;
-}
-
-Interface interface_at(Path path, SurfacePoint p, Material material, float width) {
-    Dielectric dielectric = material.dielectric;
-    Interface i;
-    bool solid = (p.triangle.flags & TRIANGLE_SOLID) != 0;
-    i.refracts = refracts(material, p);
-    i.enters = dot(p.face_normal, path.direction) < 0.0;
-    i.face = i.enters ? p.face_normal : -p.face_normal;
-    vec3 smooth_normal = dot(p.normal, i.face) < 0.0 ? -p.normal : p.normal;
-    i.normal = ripple_normal(solid ? smooth_normal : i.face, p.position, dielectric.ripple, width, p.stage.time);
-    float cosine = -dot(i.normal, path.direction);
-    if (cosine <= 0.0) {
-        i.normal = i.face;
-        cosine = -dot(i.face, path.direction);
-    }
-    i.bend = dielectric.ripple > 0.0 ? BENT_BY_RIPPLES : BENT_BY_SHAPE;
-    i.frost = 0.0;
-    if (is_frosted(material)) {
-        float rough = max(material.specular.roughness, LEAST_ROUGHNESS);
-        i.frost = rough * rough;
-        i.normal = sample_facet(i.frost, i.normal, -path.direction, rng_next2());
-        cosine = max(-dot(i.normal, path.direction), 0.0);
-        i.bend = BENT_BY_RIPPLES;
-    }
-    i.eta = !i.refracts || i.enters ? dielectric.index : 1.0 / dielectric.index;
-    i.mirrored = dielectric_reflectance(material, p, cosine, i.eta);
-    return i;
-}
-
 // Handles the reflection of the surface; true if the path is mirrored.
 bool pass_interface(inout Path path, SurfacePoint p, Interface i, SeenLayer seen, float t) {
     Layer layer = seen.linear;
@@ -161,12 +113,9 @@ void scatter_path(inout Path path, SurfacePoint p, Interface i, float t) {
 
 // Continues the path refracted, on the other side of the surface of a liquid.
 void refract_path(inout Path path, SurfacePoint p, Interface i, vec3 absorption, float t) {
-    vec3 refracted = refract(path.direction, i.normal, 1.0 / i.eta);
-    // a ripple may refract the ray backwards; it continues straight then
-    if (dot(refracted, i.face) >= 0.0) refracted = path.direction;
     path.absorption = i.enters ? absorption : vec3(0.0);
     path.bent = max(path.bent, i.bend);
-    redirect_path(path, p, t, -i.face, normalize(refracted));
+    redirect_path(path, p, t, -i.face, refracted_direction(path.direction, i));
 }
 
 #endif
