@@ -184,6 +184,7 @@ settings! { variables {
     rt_sharpness: f32 = "rt_sharpness", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "Sharpens the picture of rt_taa or rt_scale: 0 none, 1 most.";
     rt_max_depth: u32 = "rt_maxDepth", "4", ARCHIVE, kept(0.0, 16.0), Frame, Restarts, "Mirrors and panes of glass that a view ray may pass.";
     rt_specular: bool = "rt_specular", "1", ARCHIVE, None, Frame, Restarts, "1 shows roughness, metal and normal maps of files of materials, 0 shows these surfaces as diffuse.";
+    rt_caustics: bool = "rt_caustics", "0", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "1 refracts the light that crosses water and bodies of glass, by photons, in frames of rt_accumulate; 0 lets it pass straight.";
     rt_bounces: u32 = "rt_bounces", "1", ARCHIVE, kept(0.0, MOST_BOUNCES as f32), Frame, Restarts, "Bounces of light from surface to surface, matt or mirror. Few maps need more than 1.";
     rt_exposure: f32 = "rt_exposure", "0", ARCHIVE, kept(-16.0, 16.0), Frame, GoesOn, "Exposure in stops, added to the automatic one.";
     rt_auto_exposure: bool = "rt_autoExposure", "1", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 adapts the exposure to the picture.";

@@ -6,6 +6,7 @@
 pub mod constants;
 mod frames;
 mod lights;
+mod photons;
 mod structures;
 mod surroundings;
 mod view;
@@ -19,6 +20,7 @@ pub use lights::{
     BspNode, DynamicRow, EmittedLight, LightBounds, LightRow, LightSlot, LightView, SphereLight,
     SunLight, TriangleLight,
 };
+pub use photons::{BodyTriangle, Photon, PhotonCell, PhotonView};
 pub use structures::{
     BvhInstance, BvhNode, BvhTriangle, FilterStep, GeometryRecord, GridRecord, PassStep,
 };
@@ -40,6 +42,8 @@ pub struct TraceView {
     pub lights: LightView,
     /// Filters, boxes around layers, limits of paths.
     pub transport: TransportView,
+    /// Photons of caustics.
+    pub photons: PhotonView,
     /// Motion of surfaces.
     pub motion: MotionView,
     /// The denoiser's images.

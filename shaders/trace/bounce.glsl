@@ -11,6 +11,7 @@
 #include "trace/subsample.glsl"
 #include "trace/mirrors.glsl"
 #include "trace/specular_lights.glsl"
+#include "trace/photons.glsl"
 
 // 1: the map has fog. 0 removes the code of fog.
 layout(constant_id = 1) const uint HAS_FOG = 0;
@@ -28,7 +29,7 @@ const float BOUNCE_SPREAD = 0.1;
 
 // How a ray of a path starts, which decides who samples the lights that it meets. CHAIN_NONE: at a diffuse vertex, where
 // `one_light` samples them. CHAIN_SAMPLED: at a flat mirror that a ray from a diffuse vertex has met; `mirror_light.rgen`
-// samples the lights that lie behind it. CHAIN_UNSAMPLED: at another mirror or at a portal; no pass samples lights
+// or photons sample the lights that lie behind it. CHAIN_UNSAMPLED: at another mirror or at a portal; no pass samples lights
 // there, so that their emission counts where the ray hits it. CHAIN_ROUGH: at a rough surface; samples of lights and rays
 // share what rays can meet (multiple importance sampling, power heuristic; Veach, Robust Monte Carlo Methods, section
 // 9.2.4), by the density of the ray, which the upper bits hold.
@@ -238,7 +239,8 @@ bool bounce_shade(Hit hit, vec3 origin, uint chain, float most, inout vec3 throu
     v.to_viewer = -direction;
     v.gloss = NO_GLOSS;
     if (LAST_BOUNCE == 0 && chooses_mirror(p, direction, layer, throughput)) {
-        v.chain = chain == CHAIN_NONE && is_sampled_mirror(p) ? CHAIN_SAMPLED : CHAIN_UNSAMPLED;
+        bool sampled = is_sampled_mirror(p) || photons_mirror(p, direction);
+        v.chain = chain == CHAIN_NONE && sampled ? CHAIN_SAMPLED : CHAIN_UNSAMPLED;
         mirror_ray(p, v.face_normal, v.normal, direction, v.position, v.direction);
         return true;
     }

@@ -18,7 +18,7 @@ void main() {
     ivec2 pixel = bounce_pixel(cell);
     if (any(greaterThanEqual(pixel, ivec2(VIEW.width, VIEW.height))) || has_no_gloss(pixel)) return;
     LightTask task = bounce_task(pixel);
-    BounceLight b = BounceLight(vec3(0.0), no_light(), vec3(0.0));
+    BounceLight b = BounceLight(vec3(0.0), no_light(), vec3(0.0), true);
     PathVertex v = first_vertex(task);
     float random = 0.5;
     vec3 throughput;
@@ -42,9 +42,11 @@ void main() {
             if (v.chain == CHAIN_NONE) {
                 b.light = vertex_light(v);
                 b.light.light *= throughput;
+                if (CAUSTICS != 0) b.found += throughput * photon_light(v.position, v.face_normal, v.normal);
             } else if (v.chain == CHAIN_ROUGH) {
                 b.light = rough_light(v, LAST_BOUNCE == 0);
                 b.light.light *= throughput;
+                b.diffuse = false;
                 onward = rough_direction(v, throughput);
             }
             b.origin = vertex_origin(v);

@@ -117,13 +117,14 @@ struct BounceLight {
     vec3 origin;
     LightSample light;
     vec3 found;
+    bool diffuse; // the light is of a diffuse surface, which photons light too
 };
 
 // `dither`: see `pack_light`.
 void bounce_light_write(ivec2 cell, BounceLight b, float dither) {
     BounceTexels texels = BounceTexels(VIEW.scratch);
     texels.at[bounce_place(cell, 2)] = uvec4(floatBitsToUint(b.origin), pack_light(finite_light(b.found), dither));
-    texels.at[bounce_place(cell, 3)] = pack_light_ray(b.light, uvec2(0), b.light.sky, dither);
+    texels.at[bounce_place(cell, 3)] = pack_light_ray(b.light, uvec2(b.diffuse ? 0 : 1, 0), b.light.sky, dither);
 }
 
 BounceLight bounce_light_read(ivec2 cell) {
@@ -133,7 +134,7 @@ BounceLight bounce_light_read(ivec2 cell) {
     bool sky;
     LightSample light = unpack_light_ray(texels.at[bounce_place(cell, 3)], spare, sky);
     light.sky = sky;
-    return BounceLight(uintBitsToFloat(found.xyz), light, unpack_light(found.w));
+    return BounceLight(uintBitsToFloat(found.xyz), light, unpack_light(found.w), spare.x == 0);
 }
 
 // Origin of the last shadow ray, and the radiance found so far.

@@ -2,7 +2,7 @@
 // absorption in them, so the light measured in liquids would be reduced twice.
 //
 // The tint is the mean over the surface, so that a shadow ray evaluates no stages. Light passes straight through: the
-// light that refraction would focus (caustics) is spread evenly, with the same mean.
+// light that refraction would focus is spread evenly, with the same mean. Photons (`photons.rgen`) refract it instead.
 #ifndef RELIGHT_TRACE_FILTERS_GLSL
 #define RELIGHT_TRACE_FILTERS_GLSL
 
@@ -15,15 +15,17 @@ const uint MAX_FILTERS = 8;
 // A filter nearer than this to the start of the ray is a layer of the same surface, units.
 const float FILTER_CLEARANCE = 0.25;
 
-// Whether the ray passes near a filter.
-bool meets_filter(vec3 origin, vec3 direction, float distance) {
-    return meets_box(Boxes(VIEW.transport.filters), VIEW.transport.filter_count, origin, direction, distance);
+// Whether the ray passes near a filter; with `bodies`, or near a refracting body.
+bool meets_filter(vec3 origin, vec3 direction, float distance, bool bodies) {
+    if (bodies && meets_box(Boxes(VIEW.photons.boxes), VIEW.photons.box_count, origin, direction, distance)) return true;
+    return VIEW.transport.filter_count > 0 && meets_box(Boxes(VIEW.transport.filters), VIEW.transport.filter_count, origin, direction, distance);
 }
 
-// Transmittance of the filters along the ray.
-vec3 filtered(vec3 origin, vec3 direction, float distance) {
+// Transmittance of the filters along the ray. With `bodies` the ray ends at the first refracting body, which replaces
+// `body`.
+vec3 filtered(vec3 origin, vec3 direction, float distance, bool bodies, inout Hit body) {
     vec3 color = vec3(1.0);
-    if (VIEW.transport.filter_count == 0 || !meets_filter(origin, direction, distance)) return color;
+    if (!meets_filter(origin, direction, distance, bodies)) return color;
     LayerOrder order = layer_begin();
     LayerList found;
     for (uint i = 0; i < MAX_FILTERS; i++) {
@@ -32,6 +34,10 @@ vec3 filtered(vec3 origin, vec3 direction, float distance) {
         if (hit.geometry == NO_HIT) break;
         SurfacePoint p = surface_point(hit);
         Dielectric dielectric = material_of(p.triangle.material).dielectric;
+        if (bodies && (p.triangle.flags & TRIANGLE_BODY) != 0) {
+            body = hit;
+            break;
+        }
         if (dielectric.filters == 0 || (p.triangle.flags & TRIANGLE_WORLD) == 0) continue;
         if (hit.t < FILTER_CLEARANCE) continue;
         // a body's tint counts once
@@ -42,6 +48,12 @@ vec3 filtered(vec3 origin, vec3 direction, float distance) {
         if (max_component(color) <= 0.0) break;
     }
     return color;
+}
+
+// Transmittance of filters and refracting bodies along the ray.
+vec3 filtered(vec3 origin, vec3 direction, float distance) {
+    Hit none = Hit(NO_HIT, 0, vec2(0.0), 0.0);
+    return filtered(origin, direction, distance, false, none);
 }
 
 #endif

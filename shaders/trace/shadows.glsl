@@ -21,11 +21,15 @@ bool light_arrives(LightSample s, vec3 origin, uint mask) {
     return hit.geometry == NO_HIT || (s.sky && Geometries(VIEW.scene.geometries).at[hit.geometry].kind == KIND_SKY);
 }
 
-// Light of the sample that arrives. `mask`: see `shadow_mask`.
-vec3 arriving(LightSample s, vec3 origin, uint mask) {
+// Light of the sample that arrives. `mask`: see `shadow_mask`; `photons`: they bring what crosses refracting bodies.
+vec3 arriving(LightSample s, vec3 origin, uint mask, bool photons) {
     if (!(max_component(s.light) > 0.0) || !light_arrives(s, origin, mask)) return vec3(0.0);
-    return s.light * filtered(origin, s.direction, s.distance);
+    Hit body = Hit(NO_HIT, 0, vec2(0.0), 0.0);
+    vec3 light = s.light * filtered(origin, s.direction, s.distance, photons, body);
+    return body.geometry == NO_HIT ? light : vec3(0.0);
 }
+
+vec3 arriving(LightSample s, vec3 origin, uint mask) { return arriving(s, origin, mask, false); }
 
 // Selects the lights of a set one after another, so that the sum of all selected ones, weighted, has the mean of the
 // light of the whole set. Of a swept list, a light of the row that gives an ALL_RAYS-th of its estimated light or more
@@ -72,8 +76,9 @@ LightChoice enumerate_next(LightSet set, inout Enumeration e, vec3 position, vec
     return LightChoice(0, 0.0, 0.0);
 }
 
-// Direct light of a point with the geometric normal `face_normal`, by `samples` independent estimates.
-vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint mask, uint selection, uint samples) {
+// Direct light of a point with the geometric normal `face_normal`, by `samples` independent estimates. `photons`: see
+// `arriving`.
+vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint mask, uint selection, uint samples, bool photons) {
     LightSet set = lights_at(position, face_normal, normal);
     if (selection == SELECT_UNIFORM) set = whole_set(set);
     if (set_count(set) == 0) return vec3(0.0);
@@ -98,7 +103,7 @@ vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint mask, uint 
         }
         LightSample s = sample_light(choice.light, position, normal, u);
         s.light *= choice.weight;
-        sum += arriving(s, origin, mask);
+        sum += arriving(s, origin, mask, photons);
     }
     return sum / float(samples);
 }

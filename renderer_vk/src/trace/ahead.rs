@@ -3,13 +3,13 @@
 use super::pass_set::PassSet;
 use super::passes::{Pass, Switch};
 use super::view_tracer::samples_one_light;
-use super::{antialias, denoise, indirect};
+use super::{antialias, denoise, indirect, photons};
 use crate::gpu::Error;
 use crate::settings::{DenoiserChoice, Settings};
 
 /// Passes that the settings decide about, or that every frame runs, the slowest to compile first. Others are
 /// compiled when a frame first runs them.
-const AHEAD: [Pass; 33] = [
+const AHEAD: [Pass; 35] = [
     Pass::Primary,
     Pass::BounceShadeLast,
     Pass::BounceShade,
@@ -36,6 +36,8 @@ const AHEAD: [Pass; 33] = [
     Pass::Histogram,
     Pass::Exposure,
     Pass::BounceUpsample,
+    Pass::Photons,
+    Pass::PhotonCells,
     Pass::SpecularTemporal,
     Pass::SpecularFilter,
     Pass::ToneMap,
@@ -61,6 +63,7 @@ fn is_chosen(pass: Pass, settings: &Settings, needs: MapNeeds) -> bool {
             settings.rt_bounces > 0 || gloss
         }
         Pass::SpecularLight => gloss,
+        Pass::Photons | Pass::PhotonCells => needs.bodies && photons::in_use(settings),
         Pass::BounceUpsample => indirect::is_subsampled(settings, false),
         Pass::SpecularTemporal | Pass::SpecularFilter => {
             gloss && indirect::is_subsampled(settings, true)
@@ -89,6 +92,8 @@ pub struct MapNeeds {
     pub fog: bool,
     /// It has flat mirrors.
     pub mirrors: bool,
+    /// It has refracting bodies.
+    pub bodies: bool,
     /// Materials other than glass are rough or have normal maps.
     pub gloss: bool,
     /// Materials are rough, glass included, or have normal maps.
@@ -113,6 +118,7 @@ fn states(pass: Pass, settings: &Settings, needs: MapNeeds) -> Vec<usize> {
             Switch::Bounces => settings.rt_bounces > 0,
             Switch::MapFog | Switch::LitFog => needs.fog,
             Switch::Gloss => needs.has_gloss(settings),
+            Switch::Caustics => needs.bodies && photons::in_use(settings),
         };
         if !on {
             continue;

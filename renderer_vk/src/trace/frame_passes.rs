@@ -1,6 +1,9 @@
 //! Recording of the traced look's passes for one view.
 
-use shaders::trace_types::{FilterStep, PassStep, constants::RAY_TILE};
+use shaders::trace_types::{
+    FilterStep, PassStep,
+    constants::{PHOTON_ROW, RAY_TILE},
+};
 
 use super::pass_set::{PassSet, Pipeline};
 use super::passes::{Pass, Resource, Size, Switch, TABLE};
@@ -17,6 +20,8 @@ pub struct FrameFacts {
     pub fog_cells: [u32; 2],
     /// Number of flares.
     pub flares: u32,
+    /// Number of photons; 0 where none are traced.
+    pub photons: u32,
     /// One of 2 × 2 pixels gathers bounced and specular light.
     pub subsampled: bool,
     /// The map has fog.
@@ -34,6 +39,7 @@ impl FrameFacts {
             Switch::MapFog => self.map_fog,
             Switch::Bounces => self.bounces,
             Switch::Gloss => self.gloss,
+            Switch::Caustics => self.photons > 0,
         }
     }
 
@@ -47,6 +53,7 @@ impl FrameFacts {
             Size::Strata => traced.map(|n| n.div_ceil(3)),
             Size::FogCells => self.fog_cells,
             Size::Flares => [self.flares, 1],
+            Size::Photons => [PHOTON_ROW, self.photons.div_ceil(PHOTON_ROW)],
             Size::Output => output,
             Size::OutputHalf => output.map(|n| n.div_ceil(2)),
             Size::OutputQuarter => output.map(|n| n.div_ceil(4)),

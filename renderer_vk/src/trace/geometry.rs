@@ -9,13 +9,14 @@ use glam::{Vec2, Vec3};
 use shaders::trace_types::{BvhTriangle, SkyRecord};
 use shaders::types::Triangle;
 use shaders::types::constants::{
-    NO_TEXTURE, TRIANGLE_CURVED, TRIANGLE_ONE_SIDED, TRIANGLE_SOLID, TRIANGLE_STATIC,
-    TRIANGLE_WORLD,
+    NO_TEXTURE, TRIANGLE_BODY, TRIANGLE_CURVED, TRIANGLE_ONE_SIDED, TRIANGLE_SOLID,
+    TRIANGLE_STATIC, TRIANGLE_WORLD,
 };
 use support::Aabb;
 use support::slice;
 
 use super::beyond_sky::MapSkies;
+use super::bodies::{Bodies, body_surfaces};
 use super::bvh::{build_triangles, unordered};
 use super::cutout::Coverage;
 use super::doubled::doubled;
@@ -104,6 +105,8 @@ pub struct StaticGeometry {
     pub map_skies: MapSkies,
     /// Its flat mirrors.
     pub mirrors: Mirrors,
+    /// Its refracting bodies.
+    pub bodies: Bodies,
     /// Surfaces that filter light, and liquids; empty unless the caller sets them.
     pub surroundings: Surroundings,
     /// Cost of the structures.
@@ -209,10 +212,15 @@ fn members<'a>(
     sorted
 }
 
-/// The triangles of all structures, each with a range of them.
-fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
+/// The triangles of all structures, each with a range of them. `solids`: surfaces of closed bodies of glass; `bodies`: of
+/// bodies that photons are aimed at.
+fn group(
+    scene: &StaticScene<'_>,
+    materials: &dyn MaterialTable,
+    solids: &HashSet<u32>,
+    bodies: &HashSet<u32>,
+) -> Grouped {
     let doubled = doubled(scene, materials);
-    let solids = solid_surfaces(scene, materials);
     let sorted = members(scene, materials, &doubled);
     let mut grouped = Grouped {
         triangles: Vec::new(),
@@ -262,6 +270,9 @@ fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
                 if solids.contains(&surface.number) {
                     shape |= TRIANGLE_SOLID;
                 }
+                if bodies.contains(&surface.number) {
+                    shape |= TRIANGLE_BODY;
+                }
                 grouped.triangles.push(Triangle {
                     indices,
                     material,
@@ -310,7 +321,9 @@ impl StaticGeometry {
         scene: &StaticScene<'_>,
         materials: &dyn MaterialTable,
     ) -> Result<Self, Error> {
-        let grouped = group(scene, materials);
+        let solids = solid_surfaces(scene, materials);
+        let bodies = body_surfaces(scene, materials, &solids);
+        let grouped = group(scene, materials, &solids, &bodies);
         let storage = BufferUsage::STORAGE;
         let triangles = Buffer::with_data(
             device,
@@ -355,6 +368,7 @@ impl StaticGeometry {
             layers: layers(scene, materials),
             map_skies: MapSkies::new(scene, materials),
             mirrors: Mirrors::new(device, scene, materials)?,
+            bodies: Bodies::new(device, scene, materials, &bodies)?,
             surroundings: Surroundings::default(),
             triangle_records: triangles,
         })

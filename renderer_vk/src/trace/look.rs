@@ -272,6 +272,7 @@ impl TraceLook {
         MapNeeds {
             fog: !world.data.relit.bsp.fogs.is_empty(),
             mirrors: self.geometry.mirrors.count(true, None) > 0,
+            bodies: !self.geometry.bodies.is_empty(),
             gloss: assets.materials.has_gloss(false),
             frosted: assets.materials.has_gloss(true),
             metal: assets.materials.has_metal(),

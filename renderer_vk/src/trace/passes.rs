@@ -32,6 +32,8 @@ pub enum Size {
     FogCells,
     /// One for each flare.
     Flares,
+    /// One for each photon.
+    Photons,
     /// One for each pixel of the finished picture.
     Output,
     /// One for each 2 × 2 pixels of the finished picture.
@@ -53,6 +55,8 @@ pub enum Switch {
     Bounces,
     /// Materials are rough or have normal maps.
     Gloss,
+    /// Photons bring the light that crosses refracting bodies.
+    Caustics,
 }
 
 /// Data that passes exchange within a frame.
@@ -80,6 +84,10 @@ pub enum Resource {
     FogPoints,
     /// Visibility of flares.
     FlareStates,
+    /// Photons where they have landed.
+    Photons,
+    /// The grid that holds them.
+    PhotonCells,
     /// Pixels that shade a surface of the last frame again.
     GradientPixels,
     /// For each pixel, the light that its shadow ray tests.
@@ -211,7 +219,7 @@ macro_rules! passes {
         /// Declarations, in the order of [`Pass`].
         pub static TABLE: &[Row] = {
             #[allow(clippy::enum_glob_use)] // rows name many of them
-            use {Resource::*, Shader::{Compute, Rays}, Switch::{Bounces, Gloss, LitFog, MapFog}};
+            use {Resource::*, Shader::{Compute, Rays}, Switch::{Bounces, Caustics, Gloss, LitFog, MapFog}};
             &[$(Row { $($field: $value,)* ..Row::of(concat!($($about),+), $name, $shader, Size::$size) }),+]
         };
     };
@@ -250,6 +258,18 @@ passes! {
         reads: &[Scene],
         writes: &[FlareStates],
     }
+    /// Photons from lamps and suns through refracting bodies (`rt_caustics`).
+    Photons = "trace_photons", Rays(&shaders::TRACE_PHOTONS), Photons {
+        switches: &[(ids::specular::HAS_GLOSS, Gloss)],
+        reads: &[Scene, Lights],
+        writes: &[Photons],
+        counter: Some(t::COUNT_PHOTONS),
+    }
+    /// Sorts them into the cells of a grid.
+    PhotonCells = "trace_photon_cells", Compute(&shaders::TRACE_PHOTON_CELLS_COMP), Photons {
+        reads: &[Photons],
+        writes: &[PhotonCells],
+    }
     /// Finds in each stratum a surface of the last frame, which is then shaded again with its old random numbers.
     GradientReproject = "trace_gradient_reproject", Compute(&shaders::TRACE_GRADIENT_REPROJECT_COMP), Strata {
         reads: &[GBuffer, Positions, Normals],
@@ -264,29 +284,32 @@ passes! {
     /// Shadow rays to the sampled lights.
     SampledDirect = "trace_direct", Rays(&shaders::TRACE_DIRECT), RayTiles {
         constants: &[(ids::direct::SAMPLING, t::SAMPLING_LIGHT)],
+        switches: &[(ids::photons::CAUSTICS, Caustics)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, SampledLights],
-        may_read: &[GradientPixels],
+        may_read: &[GradientPixels, PhotonCells],
         writes: &[DirectLight],
         counter: Some(t::COUNT_DIRECT),
     }
     /// Shadow rays to suns, whose light is added.
     Suns = "trace_suns", Rays(&shaders::TRACE_DIRECT), RayTiles {
         constants: &[(ids::direct::SAMPLING, t::SAMPLING_SUNS)],
+        switches: &[(ids::photons::CAUSTICS, Caustics)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, SampledLights, DirectLight],
-        may_read: &[GradientPixels],
+        may_read: &[GradientPixels, PhotonCells],
         writes: &[DirectLight],
         counter: Some(t::COUNT_SUNS),
     }
     /// Direct light where a pixel samples several lights or all.
     Direct = "trace_direct", Rays(&shaders::TRACE_DIRECT), Traced {
+        switches: &[(ids::photons::CAUSTICS, Caustics)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals],
-        may_read: &[GradientPixels],
+        may_read: &[GradientPixels, PhotonCells],
         writes: &[DirectLight],
         counter: Some(t::COUNT_DIRECT),
     }
     /// Light that flat mirrors of the map reflect onto the surfaces from which a bounce starts.
     MirrorLight = "trace_mirror_light", Rays(&shaders::TRACE_MIRROR_LIGHT), Cells {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals],
         may_read: &[GradientPixels, BounceLights],
         writes: &[BounceLights],
@@ -302,22 +325,22 @@ passes! {
     }
     /// Shades what they hit, and samples a light for it.
     BounceShade = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
-        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss)],
+        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
-        may_read: &[GradientPixels, BounceLights, GlossSurfaces],
+        may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells],
         writes: &[BounceLights, GlossSurfaces],
     }
     /// The same of the last bounce, after which no path goes on.
     BounceShadeLast = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
         constants: &[(ids::bounce::LAST_BOUNCE, 1)],
-        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss)],
+        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
-        may_read: &[GradientPixels, BounceLights, GlossSurfaces],
+        may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells],
         writes: &[BounceLights, GlossSurfaces],
     }
     /// Shadow rays to those lights; the last writes the light of the paths, of one of both kinds.
     BounceLight = "trace_bounce_light", Rays(&shaders::TRACE_BOUNCE_LIGHT), Cells {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceLights],
         may_read: &[GradientPixels, GlossSurfaces],
         writes: &[IndirectLight, GlossLight],
@@ -477,7 +500,7 @@ impl Pass {
 }
 
 /// Number of ray counters.
-pub const COUNTERS: usize = t::COUNT_SPECULAR as usize + 1;
+pub const COUNTERS: usize = t::COUNT_PHOTONS as usize + 1;
 
 /// Number of the ray counter of the pass with this name.
 pub fn counter_of(name: &str) -> Option<usize> {

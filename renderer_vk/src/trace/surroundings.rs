@@ -9,7 +9,7 @@ use crate::gpu::{Buffer, BufferUsage, Device, Error};
 use crate::world::World;
 
 /// Maximum number of boxes that a shadow ray is tested against; above it, boxes are merged.
-const MAX_BOXES: usize = 16;
+pub const MAX_BOXES: usize = 16;
 /// Margin for deformed surfaces, units: the usual maximum of a deformation.
 const DEFORMATION: f32 = 16.0;
 

@@ -22,6 +22,7 @@ use super::lights::MapLights;
 use super::motion::Motion;
 use super::pass_set::PassSet;
 use super::passes::{COUNTERS, Pass, Resource};
+use super::photons::{self, Photons};
 use super::specular::SpecularTable;
 use super::targets::{OwnImages, Targets};
 use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
@@ -71,6 +72,7 @@ pub struct ViewTracer {
     antialias: Antialias,
     motion: Motion,
     bloom: Bloom,
+    pub(super) photons: Photons,
     counters: RayCounters,
     specular_table: SpecularTable,
     /// Estimator of specular light (`SPECULAR_*`).
@@ -120,6 +122,7 @@ impl ViewTracer {
             antialias: Antialias::new(device)?,
             motion: Motion::default(),
             bloom: Bloom::default(),
+            photons: Photons::default(),
             counters: RayCounters::default(),
             specular_table: SpecularTable::default(),
             specular_estimator: t::SPECULAR_BOTH,
@@ -281,6 +284,8 @@ impl ViewTracer {
             size,
             goes_on,
         )?;
+        let has_bodies = map.is_some_and(|m| !m.geometry.bodies.is_empty());
+        (self.photons).prepare(&self.device, has_bodies && photons::in_use(settings))?;
         let accumulated = self.accumulated_before(scene, materials, settings);
         let accel = self
             .accel
@@ -340,6 +345,7 @@ impl ViewTracer {
         if facts.flares > 0 {
             passes.run(Pass::FlareRays)?;
         }
+        self.photons.record(passes)?;
         self.denoiser.reproject_gradients(passes)?;
         light_directly(passes, settings, params)?;
         if facts.bounces {
@@ -380,6 +386,7 @@ impl ViewTracer {
             output,
             fog_cells: self.fog.cells(),
             flares: params.flares.count,
+            photons: params.photons.count,
             subsampled: indirect::is_subsampled(settings, targets.specular.is_some()),
             map_fog: params.scene.fog_count > 0,
             bounces: settings.rt_bounces > 0,

@@ -20,6 +20,9 @@ pub const MIRROR_TWO_SIDED: u32 = 1;
 /// They are glass or surfaces of liquids.
 pub const MIRROR_TRANSLUCENT: u32 = 2;
 
+/// Photons in a row of their launch.
+pub const PHOTON_ROW: u32 = 512;
+
 /// Levels of bloom, each of half the size of the one before.
 pub const BLOOM_LEVELS: u32 = 5;
 
@@ -100,6 +103,7 @@ pub const COUNT_BOUNCE_LIGHT: u32 = 4;
 pub const COUNT_SUNS: u32 = 5;
 pub const COUNT_MIRRORS: u32 = 6;
 pub const COUNT_SPECULAR: u32 = 7;
+pub const COUNT_PHOTONS: u32 = 8;
 
 /// Counters of each counted pass, to reduce contention.
 pub const COUNTER_ROWS: u32 = 64;
@@ -195,6 +199,8 @@ pub const STREAM_MIRRORS: u32 = 290;
 pub const STREAM_PATH: u32 = 4096;
 /// The sampled light of a rough surface: before the streams of the next path.
 pub const STREAM_SPECULAR: u32 = 4000;
+/// Photons, by number instead of by pixel.
+pub const STREAM_PHOTONS: u32 = 4001;
 
 /// `PassStep::part` of a bounce: bit of the paths that start at rough surfaces; number of the first bit of the path's
 /// number; below it the pixel of the cell.

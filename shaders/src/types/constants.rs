@@ -198,3 +198,5 @@ pub const TRIANGLE_STATIC: u32 = 8;
 pub const TRIANGLE_CURVED: u32 = 16;
 /// The triangle belongs to a closed body of glass, which refracts: both sides are hit.
 pub const TRIANGLE_SOLID: u32 = 32;
+/// The triangle belongs to a refracting body that photons are aimed at (`renderer_vk/src/trace/bodies.rs`).
+pub const TRIANGLE_BODY: u32 = 64;

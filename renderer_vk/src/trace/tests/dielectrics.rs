@@ -414,14 +414,18 @@ fn wall_in_two_parts(boundary: f32) -> Scene {
 
 /// Clear glass of index 1.5.
 fn glass(scene: &mut Scene) -> u32 {
-    let flags = c::MATERIAL_GLASS | c::MATERIAL_TRANSLUCENT | c::MATERIAL_REFLECTS;
-    let glass = scene.material(&[clear()], flags);
-    scene.materials[glass as usize].0.dielectric = Dielectric {
-        index: 1.5,
+    clear_body(scene, c::MATERIAL_GLASS | c::MATERIAL_TRANSLUCENT, 1.5)
+}
+
+/// A clear glass or liquid.
+pub(super) fn clear_body(scene: &mut Scene, flags: u32, index: f32) -> u32 {
+    let material = scene.material(&[clear()], flags | c::MATERIAL_REFLECTS);
+    scene.materials[material as usize].0.dielectric = Dielectric {
+        index,
         scale: 1.0,
         ..Dielectric::default()
     };
-    glass
+    material
 }
 
 /// The part of light that a face lets through.
@@ -487,15 +491,7 @@ fn a_block_of_glass_shifts_rays_and_a_pane_does_not(gpu: &mut Gpu) {
             Vec3::new(80.0, -200.0, -200.0),
             Vec3::new(80.0 + thickness, 200.0, 200.0),
         );
-        // the faces of a room, turned outwards
-        let first = scene.surfaces.len();
-        scene.room(mins, maxs, material);
-        for surface in &scene.surfaces[first..] {
-            let start = surface.first_index as usize;
-            for triangle in scene.indices[start..start + 6].chunks_exact_mut(3) {
-                triangle.swap(1, 2);
-            }
-        }
+        scene.block(mins, maxs, material);
         let (pixels, _) = gpu.render(&scene, &middles(), 256);
         let pixel = pixels[12 * SIDE + column].x;
         let face = 1.0 - passed(d, Vec3::X, 1.5);

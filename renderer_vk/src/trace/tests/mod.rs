@@ -4,6 +4,7 @@
 mod antialiasing;
 mod blooming;
 mod bounces;
+mod caustics;
 mod coplanar;
 mod cut_outs;
 mod denoising;

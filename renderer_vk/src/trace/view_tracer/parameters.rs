@@ -62,6 +62,9 @@ impl ViewTracer {
             scene: scene_view(rec, traced, prepared)?,
             lights: lights.of_view(rec, scene, settings)?,
             transport: self.transport(rec, traced)?,
+            photons: (traced.map)
+                .map(|m| self.photons.view(&m.geometry.bodies, accumulated))
+                .unwrap_or_default(),
             motion: prepared.motion,
             denoise: (self.denoiser).view(self.frame.wrapping_sub(1), targets),
             flares: FlareView {

@@ -261,6 +261,18 @@ impl Scene {
         self.quad(rectangle(maxs, -x, -z), material);
     }
 
+    /// The six outer faces of a box.
+    pub fn block(&mut self, mins: Vec3, maxs: Vec3, material: u32) {
+        let first = self.surfaces.len();
+        self.room(mins, maxs, material);
+        for surface in &self.surfaces[first..] {
+            let start = surface.first_index as usize;
+            for triangle in self.indices[start..start + 6].chunks_exact_mut(3) {
+                triangle.swap(1, 2);
+            }
+        }
+    }
+
     /// A rectangle of moving geometry.
     pub fn mesh(&mut self, points: [Vec3; 4], material: u32, instance: Instance) {
         let instance_index = self.instances.len() as u32;
