@@ -22,12 +22,9 @@ const MOST_RADIUS: f32 = 16.0;
 /// The exponent `a`: 2/3 balances bias and noise (section 4.3).
 const SHRINKAGE: f32 = 2.0 / 3.0;
 
-/// Whether frames with these settings trace photons, on a map with refracting bodies.
+/// Whether lit frames with these settings trace photons, on a map with refracting bodies.
 pub fn in_use(settings: &Settings) -> bool {
-    settings.rt_caustics
-        && settings.rt_accumulate
-        && settings.rt_illumination
-        && !settings.fullbright
+    settings.rt_caustics && settings.rt_accumulate
 }
 
 /// Photons of a view.

@@ -285,7 +285,8 @@ impl ViewTracer {
             goes_on,
         )?;
         let has_bodies = map.is_some_and(|m| !m.geometry.bodies.is_empty());
-        (self.photons).prepare(&self.device, has_bodies && photons::in_use(settings))?;
+        let caustics = has_bodies && is_lit(settings) && photons::in_use(settings);
+        self.photons.prepare(&self.device, caustics)?;
         let accumulated = self.accumulated_before(scene, materials, settings);
         let accel = self
             .accel
