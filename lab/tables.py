@@ -92,6 +92,13 @@ TABLES = [
      "eye rays over our hierarchies' [ratio within a run: median, least, most]; bounce rays over theirs",
      f"{LAVAPIPE}, beside other work", "2026-11-28",
      "relight-lab tracers oa_dm1 oa_koth1 hydronex2 --made 36,2064,61562 --size 256x256 --views 2 --frames 6 --runs 5"),
+    ("tracers-h200", "tracers", "| H200 | triangles | tracer",
+     "scene; triangles; tracer; cells; build [ms: median, least, most]; structures [KiB]; "
+     "eye rays [million a second: median, least, most]; bounce rays; light rays; "
+     "eye rays over our hierarchies' [ratio within a run: median, least, most]; bounce rays over theirs",
+     "NVIDIA H200", "2026-11-28",
+     "relight-lab tracers oa_dm1 oa_koth1 hydronex2 --made 36,2064,61562 --size 1920x1080 --views 3 --frames 40 --runs 3 "
+     "--set rt_lights=prior"),
     ("maps-converted", "maps-table", "| map | pack | triangles | materials",
      "map; pack; triangles; materials; images; size [MiB]; processor time [s]; errors / warnings",
      "processor", "2026-11-22", "scripts/maps-table"),
