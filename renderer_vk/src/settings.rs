@@ -160,19 +160,19 @@ settings! { variables {
     show_cluster: i32 = "r_showcluster", "0", CHEAT, None, Frame, GoesOn, "1 prints the cluster and area of the camera when they change.";
     // settings of this renderer
     rt: bool = "r_rt", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 traces light with rays, 0 draws the classic look. Switches at once.";
-    low_latency: LowLatency = "r_lowLatency", "2", ARCHIVE, kept(0.0, 2.0), Frame, GoesOn, "Time from input to picture: 0 lets two frames wait for the GPU and the display, 1 one; 2 also keeps the engine until the GPU is about to need its next frame.";
+    low_latency: LowLatency = "r_lowLatency", "2", ARCHIVE, kept(0.0, 2.0), Frame, GoesOn, "Frames that may wait for GPU and display: 0 two, 1 one; 2 also keeps the engine until the GPU needs its next frame.";
     rt_tracer: TracerChoice = "rt_tracer", "auto", ARCHIVE | LATCH, None, Start, GoesOn, "What follows the rays: auto, pipeline, query, compute or grid. A device without it gets what auto picks.";
-    rt_grid_cells: u32 = "rt_gridCells", "0", ARCHIVE | LATCH, kept(0.0, 256.0), Start, GoesOn, "Cells of rt_tracer grid along the longest side of the map; 0 picks them by its triangles. Read when a map is loaded.";
+    rt_grid_cells: u32 = "rt_gridCells", "0", ARCHIVE | LATCH, kept(0.0, 256.0), Start, GoesOn, "Cells of rt_tracer grid along the map's longest side; 0 picks them.";
     rt_lights: MapLightChoice = "rt_lights", "calibrated", ARCHIVE, None, With("rt_lights"), Restarts, "Lights of the map: calibrated, fitted to the light that its compiler stored, or prior, as its directives say. Switches at once.";
     rt_print_perf_stats: bool = "rt_printPerfStats", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 prints times, rays and memory of the traced look each second.";
     rt_illumination: bool = "rt_illumination", "1", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "0 shows surfaces in their own colour, without light.";
-    rt_cull_lights: bool = "rt_cullLights", "1", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "0 samples among all lights of the map at every point instead of those that may reach it. Same picture, slower.";
+    rt_cull_lights: bool = "rt_cullLights", "1", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "0 samples among all lights of the map, not those that may reach a point: same picture, slower.";
     rt_num_random_dl: u32 = "rt_numRandomDL", "1", ARCHIVE, kept(0.0, 64.0), Frame, Restarts, "Lights picked at random for each pixel and frame, each with a shadow ray; 0 samples all that may reach the point.";
     rt_samples: u32 = "rt_samples", "1", ARCHIVE, kept(1.0, 8.0), Frame, Restarts, "Samples of light in each frame, direct and bounced: more leave less noise and trace more rays.";
     rt_light_selection: LightSelection = "rt_lightSelection", "1", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "How a random light is picked: 0 uniformly, 1 resampled by importance. Same picture in the mean.";
     rt_candidates: u32 = "rt_candidates", "8", ARCHIVE, kept(1.0, 64.0), Frame, Restarts, "Lights looked at for each pick with rt_lightSelection 1.";
     rt_pause: bool = "rt_pause", "0", NONE, kept(0.0, 1.0), Frame, GoesOn, "1 keeps what the traced look shows still: view, entities and time. The game goes on.";
-    rt_accumulate: bool = "rt_accumulate", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 averages frames, unfiltered, for as long as nothing moves, towards the exact picture. With rt_pause 1 also in a running game.";
+    rt_accumulate: bool = "rt_accumulate", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 averages unfiltered frames while nothing moves, towards the exact picture; with rt_pause 1 also in a running game.";
     rt_antialiasing: bool = "rt_antialiasing", "1", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "1 moves the traced points within their pixels from frame to frame, for smooth edges.";
     rt_soft_shadows: bool = "rt_softshadows", "1", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "0 takes each light at its middle: sharp shadows.";
     rt_dof: bool = "rt_dof", "0", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "1 gives the camera a lens: what is out of focus is blurred.";
@@ -183,8 +183,8 @@ settings! { variables {
     rt_scale: f32 = "rt_scale", "1", ARCHIVE, kept(0.25, 1.0), Frame, GoesOn, "Width and height of the traced picture over those of the window.";
     rt_sharpness: f32 = "rt_sharpness", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "Sharpens the picture of rt_taa or rt_scale: 0 none, 1 most.";
     rt_max_depth: u32 = "rt_maxDepth", "4", ARCHIVE, kept(0.0, 16.0), Frame, Restarts, "Mirrors and panes of glass that a view ray may pass.";
-    rt_specular: bool = "rt_specular", "1", ARCHIVE, None, Frame, Restarts, "1 shows roughness, metal and normal maps of files of materials, 0 shows these surfaces as diffuse.";
-    rt_caustics: bool = "rt_caustics", "0", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "1 refracts the light that crosses water and bodies of glass, by photons, in frames of rt_accumulate; 0 lets it pass straight.";
+    rt_specular: bool = "rt_specular", "1", ARCHIVE, None, Frame, Restarts, "1 shows roughness, metal and normal maps, 0 shows such surfaces as diffuse.";
+    rt_caustics: bool = "rt_caustics", "0", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "1 refracts light in water and solid glass, by photons, with rt_accumulate.";
     rt_bounces: u32 = "rt_bounces", "1", ARCHIVE, kept(0.0, MOST_BOUNCES as f32), Frame, Restarts, "Bounces of light from surface to surface, matt or mirror. Few maps need more than 1.";
     rt_exposure: f32 = "rt_exposure", "0", ARCHIVE, kept(-16.0, 16.0), Frame, GoesOn, "Exposure in stops, added to the automatic one.";
     rt_auto_exposure: bool = "rt_autoExposure", "1", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 adapts the exposure to the picture.";
