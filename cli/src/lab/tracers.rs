@@ -50,7 +50,7 @@ pub struct TracersArgs {
     made: Vec<u32>,
     /// Tracer, by the names of rt_tracer; grid=CELLS for a grid of so many cells; may be repeated; default: all, with
     /// grids of 16, 32, 64, 128, 256 and the automatic number of cells
-    #[arg(long, value_name = "NAME", value_parser = parse_tracer)]
+    #[arg(long, value_name = "TRACER", value_parser = parse_tracer)]
     tracer: Vec<Variant>,
     /// Views of each map: the camera of the intermission first, then spawn points, evenly out of the map's list
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = numbers::count)]
