@@ -57,7 +57,7 @@ mod tests {
     use super::{command, lab};
 
     /// Options whose description differs between commands, such as a file in one and a folder in another.
-    const DESCRIBED_APART: [&str; 8] = [
+    const DESCRIBED_APART: [&str; 9] = [
         "cache",
         "calibrate",
         "frames",
@@ -65,6 +65,7 @@ mod tests {
         "look",
         "output",
         "reference",
+        "tracer",
         "view",
     ];
 
