@@ -230,6 +230,11 @@ impl Settings {
         }
     }
 
+    /// Whether the classic look shows normal maps or highlights.
+    pub fn shows_relief(&self) -> bool {
+        self.normal_mapping || self.specular_mapping
+    }
+
     /// Whether the sky is not drawn.
     pub fn hides_sky(&self) -> bool {
         self.fast_sky != 0

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 use q3bsp::GridPoint;
 use q3bsp::builder::MapBuilder;
-use relight::MemoryFiles;
+use relight::{GameFiles, MemoryFiles, SearchPath};
 use renderer_vk::api::RefDef;
 use renderer_vk::{Renderer, RendererOptions, Settings};
 
@@ -105,11 +105,18 @@ fn files() -> MemoryFiles {
 
 /// Red of the picture with these settings, row by row from the top.
 fn picture(renderer: &mut Renderer, settings: &Settings) -> Vec<u8> {
-    renderer
-        .begin_registration(Arc::new(files()), settings)
-        .unwrap();
+    load(renderer, Arc::new(files()), settings);
+    shown(renderer)
+}
+
+fn load(renderer: &mut Renderer, files: Arc<dyn GameFiles>, settings: &Settings) {
+    renderer.begin_registration(files, settings).unwrap();
     renderer.load_world("maps/t.bsp").unwrap();
     renderer.end_registration();
+}
+
+/// Red of a frame, row by row from the top.
+fn shown(renderer: &mut Renderer) -> Vec<u8> {
     renderer.begin_frame(5000);
     renderer.clear_scene();
     let def = RefDef {
@@ -155,4 +162,41 @@ fn normal_maps_and_highlights_are_those_of_opengl2() {
     }
     let messages = renderer.validation_messages();
     assert!(messages.is_empty(), "validation: {messages:#?}");
+}
+
+#[test]
+fn files_of_materials_are_read_again() {
+    let options = RendererOptions::headless(SIDE as u32, SIDE as u32);
+    let Some(mut renderer) = testkit::device(Renderer::new(options)) else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let write = |path: &str, bytes: &[u8]| {
+        let path = folder.path().join(path);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, bytes).unwrap();
+    };
+    let made = files();
+    for path in ["maps/t.bsp", "t/wall.tga", "t/wall_n.tga"] {
+        write(path, &made.read(path).unwrap().unwrap());
+    }
+    let mut settings = Settings {
+        map_overbright_bits: 0,
+        ..Settings::full_size()
+    };
+    let open = || Arc::new(SearchPath::open(&[folder.path()]).unwrap());
+    // without the settings nothing is read
+    load(&mut renderer, open(), &settings);
+    assert!(!renderer.read_by_hand_again().unwrap());
+    settings.normal_mapping = true;
+    load(&mut renderer, open(), &settings);
+    let of_pack = shown(&mut renderer);
+    // y of the line's map points up
+    write("maps/t.materials", b"normals t/wall t/wall_n\n");
+    assert!(renderer.read_by_hand_again().unwrap());
+    let of_line = shown(&mut renderer);
+    assert!(
+        of_pack[0].abs_diff(of_line[0]) > 20,
+        "{of_pack:?} {of_line:?}"
+    );
 }

@@ -45,6 +45,11 @@ impl Materials {
         faults
     }
 
+    /// Whether files of materials have been read.
+    pub fn has_files(&self) -> bool {
+        self.by_hand.is_some()
+    }
+
     /// Whether a material is rough or has a normal map. `frosted`: glass counts too.
     pub fn has_gloss(&self, frosted: bool) -> bool {
         self.list.iter().any(|m| is_glossy(m.flags, frosted))

@@ -146,8 +146,8 @@ impl Renderer {
         Ok(changed)
     }
 
-    /// Reads the files of lights and materials beside the map again, and accumulation restarts. False without a traced
-    /// view, which reads them when it is first drawn.
+    /// Reads the files of lights and materials beside the map again, and accumulation restarts. False if nothing has read
+    /// them yet: a traced view does when it is first drawn.
     ///
     /// # Errors
     /// The device is out of memory or lost.
@@ -156,6 +156,9 @@ impl Renderer {
             return Ok(false);
         };
         let read = world.read_by_hand_again(assets);
+        if self.settings.shows_relief() && assets.materials.has_gloss(false) {
+            world.need_relief(&self.device)?;
+        }
         if let Some(trace) = self.trace.as_mut().filter(|_| read) {
             trace.change_lights(world, assets)?;
         }

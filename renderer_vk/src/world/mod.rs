@@ -305,7 +305,7 @@ impl World {
             lit: None,
             before: None,
         };
-        if settings.normal_mapping || settings.specular_mapping {
+        if settings.shows_relief() {
             world.read_materials(assets);
             if assets.materials.has_gloss(false) {
                 world.need_relief(device)?;
@@ -466,11 +466,16 @@ impl World {
         self.mark_emitters(assets);
     }
 
-    /// Reads the files of lights and materials beside the map again. False before the first traced view, which reads
-    /// them.
+    /// Reads the files of lights and materials beside the map again. False if nothing has read them: that of lights is read
+    /// by the first traced view.
     pub(crate) fn read_by_hand_again(&mut self, assets: &mut Assets) -> bool {
         let Some(before) = self.before.take() else {
-            return false;
+            // the classic look has read those of materials if it shows their maps
+            let has_read = assets.materials.has_files();
+            if has_read {
+                self.read_materials(assets);
+            }
+            return has_read;
         };
         self.data.relit.set_lighting(before.files);
         self.read_by_hand(assets, None);
