@@ -7,8 +7,8 @@ use shaders::types::Instance;
 use crate::assets::Assets;
 use crate::gpu::{self, ColorMask, Image, Recorder};
 use crate::raster::{
-    Aids, DrawList, FlareTest, Flares, Overlay, PixelLights, Raster, ReliefMaps, StageContext,
-    Statics, Target, UiMeshes, ViewParameters, overlay_instance, window_to_clip,
+    Aids, DrawList, FlareTest, Flares, Overlay, PixelLights, Raster, StageContext, Statics,
+    SurfaceMapping, Target, UiMeshes, ViewParameters, overlay_instance, window_to_clip,
 };
 use crate::scene::{ClassicScene, TracedScene, ViewScene};
 use crate::settings::Settings;
@@ -119,7 +119,7 @@ impl<'a> FrameContext<'a> {
             identity_light: self.settings.identity_light(),
             light_spot: assets.textures.dynamic_light(),
             pixel_lights: PixelLights::new(self.settings),
-            relief: ReliefMaps::new(self.settings),
+            mapping: SurfaceMapping::new(self.settings),
             only_texture: self
                 .settings
                 .no_bind
@@ -174,7 +174,7 @@ impl<'a> FrameContext<'a> {
             identity_light: self.settings.identity_light(),
             materials: self.assets.materials.addresses(),
             static_vertices: 0,
-            static_relief: 0,
+            mapped_vertices: 0,
             dynamic_vertices: None,
             fogs: 0,
             instances,
@@ -228,7 +228,7 @@ impl<'a> FrameContext<'a> {
             identity_light: settings.identity_light(),
             materials: self.assets.materials.addresses(),
             static_vertices: world.map_or(0, |w| w.vertex_buffer.address()),
-            static_relief: world.map_or(0, |w| w.relief_address()),
+            mapped_vertices: world.map_or(0, |w| w.mapped_address()),
             dynamic_vertices: None,
             fogs: world.map_or(0, |w| w.fog_buffer.address()),
             instances: &scene.instances,
@@ -278,7 +278,7 @@ impl<'a> FrameContext<'a> {
             identity_light: self.settings.identity_light(),
             materials: self.assets.materials.addresses(),
             static_vertices: 0,
-            static_relief: 0,
+            mapped_vertices: 0,
             dynamic_vertices: Some(vertices),
             fogs: 0,
             instances: &quads.instances,

@@ -458,7 +458,7 @@ impl Renderer {
             let lit = world.light_by(settings.rt_lights, assets, self.calibrations.as_ref());
             // files of materials may have changed
             if assets.materials.has_normals() {
-                world.need_relief(&self.device)?;
+                world.need_mapped_vertices(&self.device)?;
             }
             let made = lit || self.trace.is_none();
             if made {

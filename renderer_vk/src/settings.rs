@@ -231,7 +231,7 @@ impl Settings {
     }
 
     /// Whether the classic look shows normal maps or highlights.
-    pub fn shows_relief(&self) -> bool {
+    pub fn shows_surface_mapping(&self) -> bool {
         self.normal_mapping || self.specular_mapping
     }
 

@@ -2,18 +2,18 @@
 // A draw of the classic look: one or more passes of a material (each a product of texture and colour, with an alpha
 // test), the blob of a dynamic light, or fog.
 // variants: MANY=-DMANY_STAGES
-// variants: RELIEF=-DMANY_STAGES -DWITH_RELIEF
+// variants: MAPPED=-DMANY_STAGES -DSURFACE_MAPPING
 // variants: COUNT=-DMANY_STAGES -DCOUNT_FRAGMENTS
 // Specialization constants (`draw.glsl`) remove unused code. Without `discard` the GPU tests depth before shading.
 #include "raster/draw.glsl"
 
 layout(location = 0) in vec4 in_uv[STAGE_PAIRS]; // two stages each
 layout(location = 2) in float in_clip;
-layout(location = 3) in flat uvec4 in_textures; // see `Draw`; with relief, the index of the draw
+layout(location = 3) in flat uvec4 in_textures; // see `Draw`; with SURFACE_MAPPING, the index of the draw
 layout(location = 4) in vec4 in_color[STAGES];
 layout(location = 8) in flat vec4 in_flat_color[STAGES];
 
-#ifdef WITH_RELIEF
+#ifdef SURFACE_MAPPING
 layout(location = 12) in vec4 in_normal; // see `draw.vert`
 layout(location = 13) in vec4 in_tangent;
 layout(location = 14) in vec4 in_light;
@@ -28,7 +28,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Counter { ui
 // The indices are dynamically uniform within a draw and need no `nonuniformEXT`.
 vec4 sample_stage(uint stage) {
     if ((TEXTURES >> stage & 1) == 0) return vec4(1.0);
-#ifdef WITH_RELIEF
+#ifdef SURFACE_MAPPING
     uint handle = Draws(VIEW.draws).at[in_textures.x].textures[stage];
 #else
     uint handle = in_textures[stage];
@@ -93,10 +93,10 @@ vec4 onto(vec4 before, uint stage) {
 }
 #endif
 
-#ifdef WITH_RELIEF
-#include "raster/relief.glsl"
+#ifdef SURFACE_MAPPING
+#include "raster/surface_mapping.glsl"
 #else
-vec4 relief_after(uint stage, vec4 color) { return color; }
+vec4 mapped_after(uint stage, vec4 color) { return color; }
 #endif
 
 #ifdef MANY_STAGES
@@ -140,10 +140,10 @@ void main() {
         if (!passes_alpha_test(0, out_color)) discard;
 #ifdef MANY_STAGES
         // unrolled by hand, so that arguments are constant for every compiler
-        out_color = relief_after(0, out_color);
-        out_color = relief_after(1, onto(out_color, 1));
-        out_color = relief_after(2, onto(out_color, 2));
-        out_color = relief_after(3, onto(out_color, 3));
+        out_color = mapped_after(0, out_color);
+        out_color = mapped_after(1, onto(out_color, 1));
+        out_color = mapped_after(2, onto(out_color, 2));
+        out_color = mapped_after(3, onto(out_color, 3));
 #endif
     }
 #ifdef COUNT_FRAGMENTS

@@ -4,6 +4,7 @@
 #include "common/bindless.glsl"
 #include "common/fog.glsl"
 #include "common/material.glsl"
+#include "common/tangent_space.glsl"
 
 layout(constant_id = 0) const uint MODE = 0;          // DRAW_*
 layout(constant_id = 1) const uint FOG_ADJUST = 0;    // FOG_ADJUST_* of the first stage
@@ -19,11 +20,11 @@ layout(constant_id = 9) const uint COLOR = 2;         // COLOR_*
 layout(constant_id = 10) const uint RGB_GEN = 0;      // RGBGEN_* of COLOR_VERTEX
 layout(constant_id = 11) const uint ALPHA_GEN = 0;    // ALPHAGEN_* of COLOR_VERTEX
 layout(constant_id = 12) const uint TC_GEN = 0;       // TCGEN_*
-layout(constant_id = 13) const uint RELIEF = 0;       // RELIEF_*; see `relief.glsl`
+layout(constant_id = 13) const uint MAPPING = 0;       // MAPPING_*; see `surface_mapping.glsl`
 
-// Of a draw with relief: the stage with the texture, and that with its light, plus one (0: the colour of the first).
-const uint TEXTURE_STAGE = RELIEF >> RELIEF_TEXTURE_SHIFT & 0xF;
-const uint LIGHT_STAGE = RELIEF >> RELIEF_LIGHT_SHIFT & 0xF;
+// Of a draw with normal or specular mapping: the stage with the texture, and that with its light, plus one (0: the colour of the first).
+const uint TEXTURE_STAGE = MAPPING >> MAPPING_TEXTURE_SHIFT & 0xF;
+const uint LIGHT_STAGE = MAPPING >> MAPPING_LIGHT_SHIFT & 0xF;
 
 // Most draws have one stage. Drivers create pipelines several times faster without the code of the other stages.
 #ifdef MANY_STAGES
@@ -36,7 +37,6 @@ const uint STAGE_PAIRS = (STAGES + 1) / 2;
 uint of_stage(uint constant, uint stage) { return constant >> 4 * stage & 0xF; }
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Vertices { Vertex at[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Reliefs { Relief at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Instances { Instance at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Draws { Draw at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Fogs { Fog at[]; };

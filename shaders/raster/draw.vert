@@ -3,7 +3,7 @@
 // as the engine does. `gl_InstanceIndex` is the index of the `Draw`.
 // variants: MANY=-DMANY_STAGES
 // variants: MODIFIED=-DMANY_STAGES -DMODIFIED_TEXCOORDS
-// variants: RELIEF=-DMANY_STAGES -DMODIFIED_TEXCOORDS -DWITH_RELIEF
+// variants: MAPPED=-DMANY_STAGES -DMODIFIED_TEXCOORDS -DSURFACE_MAPPING
 // variants: DEPTH=-DDEPTH_ALONE
 #include "raster/draw.glsl"
 
@@ -15,10 +15,10 @@ layout(location = 2) out float out_clip;
 #ifndef DEPTH_ALONE
 // Only the elements that the draw's specialization constants use are written and read.
 layout(location = 0) out vec4 out_uv[STAGE_PAIRS]; // two stages each
-layout(location = 3) out flat uvec4 out_textures; // see `Draw`; with relief, the index of the draw
+layout(location = 3) out flat uvec4 out_textures; // see `Draw`; with SURFACE_MAPPING, the index of the draw
 layout(location = 4) out vec4 out_color[STAGES];
 layout(location = 8) out flat vec4 out_flat_color[STAGES];
-#ifdef WITH_RELIEF
+#ifdef SURFACE_MAPPING
 // World space; in w the components of the vector to the viewer.
 layout(location = 12) out vec4 out_normal;
 layout(location = 13) out vec4 out_tangent;
@@ -71,9 +71,9 @@ void write_stage(Draws draws, Instance instance, StagePoint point, uint i) {
         } else {
             float portal_range = Stages(VIEW.materials.stages).at[draws.at[gl_InstanceIndex].stages[i]].portal_range;
             out_color[i] = point_color(color, of_stage(RGB_GEN, i), of_stage(ALPHA_GEN, i), portal_range, instance, point);
-#ifdef WITH_RELIEF
+#ifdef SURFACE_MAPPING
             // the fragment shader evaluates the light of the grid
-            if ((RELIEF & RELIEF_SOURCE) == RELIEF_OF_GRID && i == TEXTURE_STAGE) out_color[i].rgb = vec3(1.0);
+            if ((MAPPING & MAPPING_SOURCE) == MAPPING_OF_GRID && i == TEXTURE_STAGE) out_color[i].rgb = vec3(1.0);
 #endif
         }
     }
@@ -84,16 +84,16 @@ void write_stage(Draws draws, Instance instance, StagePoint point, uint i) {
 }
 #endif
 
-#ifdef WITH_RELIEF
-void write_relief(Draws draws, mat3 axis, vec3 normal, vec3 world) {
-    Relief relief = Relief(vec3(0.0), normal);
+#ifdef SURFACE_MAPPING
+void write_mapping(Draws draws, mat3 axis, vec3 normal, vec3 world) {
+    MappedVertex mapped = MappedVertex(vec3(0.0), normal);
     uint index = draws.at[gl_InstanceIndex].instance;
-    if ((RELIEF & RELIEF_SOURCE) == RELIEF_OF_GRID) relief.light = Instances(VIEW.instances).at[index].light_direction;
-    else if (draws.at[gl_InstanceIndex].dynamic_vertices == 0 && VIEW.static_relief != 0) relief = Reliefs(VIEW.static_relief).at[gl_VertexIndex];
+    if ((MAPPING & MAPPING_SOURCE) == MAPPING_OF_GRID) mapped.light = Instances(VIEW.instances).at[index].light_direction;
+    else if (draws.at[gl_InstanceIndex].dynamic_vertices == 0 && VIEW.mapped_vertices != 0) mapped = MappedVertices(VIEW.mapped_vertices).at[gl_VertexIndex];
     vec3 to_viewer = VIEW.origin - world;
     out_normal = vec4(axis * normal, to_viewer.x);
-    out_tangent = vec4(axis * relief.tangent, to_viewer.y);
-    out_light = vec4(axis * relief.light, to_viewer.z);
+    out_tangent = vec4(axis * mapped.tangent, to_viewer.y);
+    out_light = vec4(axis * mapped.light, to_viewer.z);
     out_textures = uvec4(gl_InstanceIndex); // the draw has the textures
 }
 #endif
@@ -150,8 +150,8 @@ void main() {
         write_stage(draws, instance, point, 2);
         write_stage(draws, instance, point, 3);
 #endif
-#ifdef WITH_RELIEF
-        write_relief(draws, axis, point.normal, world);
+#ifdef SURFACE_MAPPING
+        write_mapping(draws, axis, point.normal, world);
 #endif
         if (FOG_ADJUST != FOG_ADJUST_NONE) {
             float through = 1.0 - fog_factor(fog_coordinates(draws.at[gl_InstanceIndex].fog, world));

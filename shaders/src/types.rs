@@ -27,10 +27,11 @@ pub struct Vertex {
     pub color: u32,
 }
 
-/// What relief needs of a static vertex; with relief alone, in parallel to the world's vertices. Space of the vertex.
+/// Tangent and light direction of a vertex of the world, for normal and specular mapping, in the space of the vertex. The
+/// array is parallel to that of the vertices.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct Relief {
+pub struct MappedVertex {
     /// Unit tangent along s, as MikkTSpace; zero if the texture coordinates define none.
     pub tangent: Vec3,
     /// Unit direction from which most of the baked light comes.
@@ -287,8 +288,8 @@ pub struct RasterView {
     pub materials: MaterialBuffers,
     /// The world's [`Vertex`] array.
     pub static_vertices: u64,
-    /// The world's [`Relief`] array; 0 if no draw needs it.
-    pub static_relief: u64,
+    /// The world's [`MappedVertex`] array; 0 if no draw needs it.
+    pub mapped_vertices: u64,
     /// [`Vertex`] array of moving geometry.
     pub dynamic_vertices: u64,
     /// [`Instance`]s.
@@ -328,7 +329,7 @@ pub struct Draw {
     pub light: u32,
     /// 1: the vertices are in `dynamic_vertices`.
     pub dynamic_vertices: u32,
-    /// Index of the material, of draws with relief.
+    /// Index of the material, of draws with normal or specular mapping.
     pub material: u32,
 }
 

@@ -2,6 +2,7 @@
 #ifndef RELIGHT_TRACE_GEOMETRY_GLSL
 #define RELIGHT_TRACE_GEOMETRY_GLSL
 
+#include "common/tangent_space.glsl"
 #include "trace/view.glsl"
 
 const uint NO_HIT = 0xFFFFFFFFu;
@@ -30,11 +31,6 @@ struct SurfacePoint {
 
 Instance instance_of(uint index) { return TraceInstances(VIEW.scene.instances).at[index]; }
 Material material_of(uint index) { return Materials(VIEW.materials.materials).at[index]; }
-
-vec3 safe_normalize(vec3 v, vec3 otherwise) {
-    float squared = dot(v, v);
-    return squared > 1.0e-30 ? v * inversesqrt(squared) : otherwise;
-}
 
 // Two unit vectors perpendicular to n (Duff et al., Building an Orthonormal Basis, Revisited, 2017).
 void basis(vec3 n, out vec3 t, out vec3 b) {

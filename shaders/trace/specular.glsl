@@ -153,9 +153,9 @@ vec3 surface_tangent(SurfacePoint p, out vec3 along_t) {
     vec2 sb = b.st - a.st, sc = c.st - a.st;
     float turn = sign(sb.x * sc.y - sb.y * sc.x);
     along_t = (ac * sb.x - ab * sc.x) * turn;
-    if (VIEW.scene.relief != 0 && (p.triangle.flags & TRIANGLE_STATIC) != 0) {
-        Reliefs relief = Reliefs(VIEW.scene.relief);
-        vec3 tangent = relief.at[corners.x].tangent * p.weights.x + relief.at[corners.y].tangent * p.weights.y + relief.at[corners.z].tangent * p.weights.z;
+    if (VIEW.scene.mapped_vertices != 0 && (p.triangle.flags & TRIANGLE_STATIC) != 0) {
+        MappedVertices mapped = MappedVertices(VIEW.scene.mapped_vertices);
+        vec3 tangent = mapped.at[corners.x].tangent * p.weights.x + mapped.at[corners.y].tangent * p.weights.y + mapped.at[corners.z].tangent * p.weights.z;
         if (tangent != vec3(0.0)) return axis * tangent;
     }
     return (ab * sc.y - ac * sb.y) * turn;
@@ -167,16 +167,8 @@ vec3 mapped_normal(SurfacePoint p, Material material, Footprint footprint) {
     if (HAS_GLOSS == 0 || (material.flags & MATERIAL_NORMALS) == 0) return p.normal;
     vec3 along_t;
     vec3 tangent = surface_tangent(p, along_t);
-    tangent = safe_normalize(tangent - p.normal * dot(p.normal, tangent), vec3(0.0));
-    if (tangent == vec3(0.0)) return p.normal;
-    // t points down in texture coordinates, up in normal maps
-    vec3 up = cross(p.normal, tangent);
-    if (dot(up, along_t) > 0.0) up = -up;
     vec2 texel = map_texel(specular, specular.normals, p, footprint).xy;
-    // as `opengl2`: the third component follows from the others
-    vec2 tangential = (texel * 2.0 - 1.0) * specular.normal_scale;
-    vec3 local = vec3(tangential, sqrt(max(1.0 - dot(tangential, tangential), 0.0)));
-    return safe_normalize(tangent * local.x + up * local.y + p.normal * local.z, p.normal);
+    return normal_from_map(p.normal, tangent, along_t, texel, specular.normal_scale);
 }
 
 // Gives the specular part of the light that reaches a layer to the result, and the rest to its diffuse part `lit`.

@@ -10,7 +10,6 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Tra
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Geometries { GeometryRecord at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Triangles { Triangle at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TraceVertices { Vertex at[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Reliefs { Relief at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TraceInstances { Instance at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TraceFogs { Fog at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Portals { PortalRecord at[]; };

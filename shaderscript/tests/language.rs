@@ -183,6 +183,14 @@ fn colors() {
     }
     // Vertex colours bring their alpha unless an earlier line defines another one.
     assert_eq!(stage("rgbGen vertex").alpha_gen, AlphaGen::Vertex);
+    // words of opengl2 for the same colours
+    let lit = stage("rgbGen vertexLit");
+    assert_eq!(
+        (lit.rgb_gen, lit.alpha_gen),
+        (RgbGen::Vertex, AlphaGen::Vertex)
+    );
+    let lit = stage("rgbGen exactVertexLit").rgb_gen;
+    assert_eq!(lit, RgbGen::ExactVertex);
     assert_eq!(
         stage("alphaGen entity\nrgbGen vertex").alpha_gen,
         AlphaGen::Entity

@@ -1,7 +1,7 @@
 //! A registered material: a script's definition bound to images, in the form that the passes read.
 
 use super::finish::OfScript;
-use super::relief::LitTexture;
+use super::lit_texture::LitTexture;
 use shaders::types::{Dielectric, Specular};
 use shaderscript::{AlphaGen, Cull, Deform, Fog, Shader, TcGen};
 

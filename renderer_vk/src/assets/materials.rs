@@ -18,10 +18,10 @@ use super::dielectric;
 use super::finish::OfScript;
 use super::flags;
 use super::light_stage;
+use super::lit_texture;
 use super::material::{LightmapClass, Material, SkyBox, VideoStage};
 use super::material_buffers::Uploaded;
 use super::prepare::grey;
-use super::relief;
 use super::source::{ImageFlags, ImageSource};
 use crate::settings::Settings;
 
@@ -375,7 +375,8 @@ impl Materials {
             stage_count,
             light_stage: light_stage::light_stage(&shader, sort)
                 .and_then(|stage| stage_first.checked_add(u32::try_from(stage).ok()?)),
-            lit_texture: relief::lit_texture(&shader, class).map(|lit| lit.of_gpu(stage_first)),
+            lit_texture: lit_texture::lit_texture(&shader, class)
+                .map(|lit| lit.of_gpu(stage_first)),
             sky,
             fog: shader.fog,
             surface_flags: shader.surface_flags,

@@ -8,13 +8,13 @@ mod finish;
 mod flags;
 mod fonts;
 mod light_stage;
+mod lit_texture;
 mod material;
 mod material_buffers;
 mod materials;
 mod model_load;
 mod models;
 pub mod prepare;
-mod relief;
 mod skins;
 mod source;
 mod textures;
@@ -26,12 +26,12 @@ use relight::GameFiles;
 #[cfg(test)]
 pub use finish::is_glossy;
 pub use fonts::LoadedFont;
+pub use lit_texture::TextureLight;
 pub use material::{Combine, LightmapClass, Material, NO_DYNAMIC_LIGHT, RasterPass};
 pub use materials::{MaterialSettings, Materials};
 pub use models::{IqmModel, Md3Lod, MdrModel, Model, Models};
 pub use prepare::TextureSettings;
 pub(crate) use prepare::{desaturate, grey};
-pub use relief::TextureLight;
 pub use skins::Skins;
 #[cfg(test)]
 pub use source::ImageFlags;

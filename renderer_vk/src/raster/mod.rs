@@ -20,6 +20,7 @@ mod present;
 mod shading;
 mod shadows;
 pub(crate) mod sky;
+mod surface_mapping;
 mod target;
 mod ui;
 
@@ -34,7 +35,8 @@ pub use flares::{FlareTest, Flares, window_to_clip};
 pub use list::{DrawList, Statics};
 pub use overlay::{Overlay, Picture2d, overlay_instance};
 pub use present::{Display, Present};
-pub use shading::{PixelLights, ReliefMaps, StageContext};
+pub use shading::{PixelLights, StageContext};
+pub use surface_mapping::SurfaceMapping;
 pub use target::Target;
 pub use ui::{UiMeshes, UiTextures};
 
@@ -79,8 +81,8 @@ pub struct ViewParameters<'a> {
     pub materials: MaterialBuffers,
     /// Address of the world's vertices, or 0.
     pub static_vertices: u64,
-    /// Address of what relief needs of the world's vertices, or 0.
-    pub static_relief: u64,
+    /// Address of the tangents and light directions of the world's vertices ([`shaders::types::MappedVertex`]), or 0.
+    pub mapped_vertices: u64,
     /// Address of the moving vertices; `None`: those of the list.
     pub dynamic_vertices: Option<u64>,
     /// Address of the fog volumes, or 0.
@@ -297,7 +299,7 @@ impl Raster {
             light_backs: p.light_backs.into(),
             materials: p.materials,
             static_vertices: p.static_vertices,
-            static_relief: p.static_relief,
+            mapped_vertices: p.mapped_vertices,
             dynamic_vertices: match p.dynamic_vertices {
                 Some(address) => address,
                 None => arena.push(&list.vertices)?,
@@ -342,7 +344,7 @@ impl Raster {
                 pass.bind_graphics(pipeline);
                 state = Some(call.state);
                 // Mesa's software driver drops fragment push constants after a pipeline that uses none
-                if overdraw != 0 || call.state.shading.relief != 0 {
+                if overdraw != 0 || call.state.shading.mapping != 0 {
                     pushed = 0;
                 }
             }

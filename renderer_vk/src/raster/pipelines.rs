@@ -131,11 +131,11 @@ impl Pipelines {
         let modified = state.shading.tc_mods != 0;
         let several_inputs = state.shading.mode == c::DRAW_PIXEL_LIGHT;
         let many = state.shading.has_stages() || several_inputs || modified || target.counted;
-        let relief = state.shading.relief != 0 && !target.counted;
+        let mapped = state.shading.mapping != 0 && !target.counted;
         let vertex = if depth_alone {
             &shaders::RASTER_DRAW_VERT_DEPTH
-        } else if relief {
-            &shaders::RASTER_DRAW_VERT_RELIEF
+        } else if mapped {
+            &shaders::RASTER_DRAW_VERT_MAPPED
         } else if modified {
             &shaders::RASTER_DRAW_VERT_MODIFIED
         } else if many {
@@ -145,8 +145,8 @@ impl Pipelines {
         };
         let fragment = if target.counted {
             &shaders::RASTER_DRAW_FRAG_COUNT
-        } else if relief {
-            &shaders::RASTER_DRAW_FRAG_RELIEF
+        } else if mapped {
+            &shaders::RASTER_DRAW_FRAG_MAPPED
         } else if many {
             &shaders::RASTER_DRAW_FRAG_MANY
         } else {

@@ -8,8 +8,9 @@ use shaders::types::{DRAW_STAGES, Draw, Instance};
 use shaderscript::{AlphaGen, Cull, RgbGen, TcMod, WaveFunction, eval};
 use support::slice;
 
+use super::surface_mapping::SurfaceMapping;
 use crate::assets::compile::sampler;
-use crate::assets::{Combine, Material, Materials, RasterPass, Samplers, TextureLight};
+use crate::assets::{Combine, Material, Materials, RasterPass, Samplers};
 use crate::settings::Settings;
 
 /// Number of low bits of a handle in [`Draw::textures`] for the texture; the sampler is above.
@@ -67,8 +68,8 @@ pub struct Shading {
     pub alpha_gen: PerStage,
     /// `TCGEN_*`.
     pub tc_gen: PerStage,
-    /// `RELIEF_*`; 0: none.
-    pub relief: u32,
+    /// `MAPPING_*`; 0: none.
+    pub mapping: u32,
 }
 
 /// Number of specialization constants.
@@ -90,7 +91,7 @@ impl Shading {
         rgb_gen: PerStage::NONE,
         alpha_gen: PerStage::NONE,
         tc_gen: PerStage::NONE,
-        relief: 0,
+        mapping: 0,
     };
 
     /// The spot of a dynamic light.
@@ -110,7 +111,7 @@ impl Shading {
     /// The same, but shows only the second of two textures (`r_lightmap`).
     pub fn second_alone(mut self) -> Self {
         self.combine.set(1, c::COMBINE_REPLACE);
-        self.relief = 0;
+        self.mapping = 0;
         self
     }
 
@@ -135,7 +136,7 @@ impl Shading {
             (id::RGB_GEN, self.rgb_gen.0),
             (id::ALPHA_GEN, self.alpha_gen.0),
             (id::TC_GEN, self.tc_gen.0),
-            (id::RELIEF, self.relief),
+            (id::MAPPING, self.mapping),
         ]
     }
 }
@@ -189,38 +190,6 @@ impl PixelLights {
     }
 }
 
-/// The maps that vary light on surfaces, by `opengl2`'s settings.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ReliefMaps {
-    /// Normal maps (`r_normalMapping`).
-    pub normals: bool,
-    /// Roughness, metal and reflectance (`r_specularMapping`).
-    pub highlights: bool,
-}
-
-impl ReliefMaps {
-    /// By the settings.
-    pub fn new(settings: &Settings) -> Self {
-        Self {
-            normals: settings.normal_mapping,
-            highlights: settings.specular_mapping,
-        }
-    }
-
-    /// `RELIEF_*` of a material, without the stages; 0: it has no such map.
-    fn of(self, material: &Material) -> u32 {
-        let bit = |in_use: bool, flag: u32, bit: u32| {
-            if in_use && material.flags & flag != 0 {
-                bit
-            } else {
-                0
-            }
-        };
-        bit(self.normals, c::MATERIAL_NORMALS, c::RELIEF_NORMALS)
-            | bit(self.highlights, c::MATERIAL_ROUGH, c::RELIEF_HIGHLIGHT)
-    }
-}
-
 /// Parameters for the evaluation of stages.
 #[derive(Clone, Copy)]
 pub struct StageContext<'a> {
@@ -235,7 +204,7 @@ pub struct StageContext<'a> {
     /// Evaluation of dynamic lights per pixel; `None`: they are spots.
     pub pixel_lights: Option<PixelLights>,
     /// Maps that vary light.
-    pub relief: ReliefMaps,
+    pub mapping: SurfaceMapping,
     /// Replaces every texture (`r_nobind`).
     pub only_texture: Option<u32>,
 }
@@ -301,37 +270,14 @@ impl StageContext<'_> {
             };
             shading.color.set(place, kind);
         }
-        self.set_relief(material, &mut shading, &mut draw);
+        let mapping = self
+            .mapping
+            .of_draw(material, draw.stages, shading.textures);
+        if let Some(mapping) = mapping.filter(|_| self.only_texture.is_none()) {
+            shading.mapping = mapping;
+            draw.material = material.order;
+        }
         (shading, draw)
-    }
-
-    /// Adds relief to a draw of a material, if the draw has both its first texture and the light of it.
-    fn set_relief(&self, material: &Material, shading: &mut Shading, draw: &mut Draw) {
-        let maps = self.relief.of(material);
-        let shown = maps != 0 && self.only_texture.is_none();
-        let (Some(lit), true) = (material.lit_texture, shown) else {
-            return;
-        };
-        let place = |stage: u32| {
-            let textured = |place: &usize| shading.textures >> place & 1 != 0;
-            let places = (0..DRAW_STAGES).zip(draw.stages);
-            let mut places = places.filter_map(|(at, drawn)| (drawn == stage).then_some(at));
-            places.find(textured).and_then(|at| u32::try_from(at).ok())
-        };
-        let Some(texture) = place(lit.texture) else {
-            return;
-        };
-        let (source, light) = match lit.light {
-            TextureLight::Lightmap(stage) => match place(stage) {
-                Some(light) => (c::RELIEF_BAKED, light + 1),
-                None => return,
-            },
-            TextureLight::Vertices => (c::RELIEF_BAKED, 0),
-            TextureLight::Grid => (c::RELIEF_OF_GRID, 0),
-        };
-        shading.relief =
-            maps | source | texture << c::RELIEF_TEXTURE_SHIFT | light << c::RELIEF_LIGHT_SHIFT;
-        draw.material = material.order;
     }
 
     /// The draw of a texture with a sampler ([`sampler`]), times vertex colours.

@@ -156,8 +156,8 @@ impl Renderer {
             return Ok(false);
         };
         let read = world.read_by_hand_again(assets);
-        if self.settings.shows_relief() && assets.materials.has_gloss(false) {
-            world.need_relief(&self.device)?;
+        if self.settings.shows_surface_mapping() && assets.materials.has_gloss(false) {
+            world.need_mapped_vertices(&self.device)?;
         }
         if let Some(trace) = self.trace.as_mut().filter(|_| read) {
             trace.change_lights(world, assets)?;

@@ -74,7 +74,7 @@ impl Renderer {
             identity_light: self.settings.identity_light(),
             light_spot: assets.textures.dynamic_light(),
             pixel_lights: raster::PixelLights::new(&self.settings),
-            relief: raster::ReliefMaps::new(&self.settings),
+            mapping: raster::SurfaceMapping::new(&self.settings),
             only_texture: None,
         };
         let surfaces = self.world.iter().flat_map(|world| &world.surfaces);
@@ -95,7 +95,7 @@ impl Renderer {
             identity_light: self.settings.identity_light(),
             materials: assets.materials.addresses(),
             static_vertices: 0,
-            static_relief: 0,
+            mapped_vertices: 0,
             dynamic_vertices: None,
             fogs: fogs.map_or(0, |world| world.fog_buffer.address()),
             instances: &[raster::expected_instance()],

@@ -89,8 +89,8 @@ pub struct StaticGeometry {
     pub structures: Vec<StaticBlas>,
     /// Device address of the vertices that their triangles index.
     pub vertices: u64,
-    /// Device address of the vertices' `Relief`; 0: they have none.
-    pub relief: u64,
+    /// Device address of the vertices' `MappedVertex`; 0: they have none.
+    pub mapped_vertices: u64,
     /// Sky records, indexed by the lightmap field of sky triangles.
     pub skies: Buffer,
     /// Fog volumes.
@@ -358,7 +358,7 @@ impl StaticGeometry {
             structures,
             cost,
             vertices: scene.vertex_address,
-            relief: scene.relief_address,
+            mapped_vertices: scene.mapped_address,
             skies: Buffer::with_data(device, "trace skies", storage, &grouped.skies)?,
             fogs: Buffer::with_data(device, "trace fogs", storage, scene.fogs)?,
             fog_count: u32::try_from(scene.fogs.len()).unwrap_or(u32::MAX),

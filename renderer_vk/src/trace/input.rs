@@ -146,8 +146,8 @@ pub struct StaticScene<'a> {
     pub vertices: &'a [Vertex],
     /// Device address of the same vertices.
     pub vertex_address: u64,
-    /// Device address of their [`Relief`](shaders::types::Relief); 0: they have none.
-    pub relief_address: u64,
+    /// Device address of their [`MappedVertex`](shaders::types::MappedVertex); 0: they have none.
+    pub mapped_address: u64,
     /// Indices, three a triangle, clockwise from the front.
     pub indices: &'a [u32],
     /// Surfaces.

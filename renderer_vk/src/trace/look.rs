@@ -107,7 +107,7 @@ fn static_scene<'a>(world: &'a World, fogs: &'a [Fog]) -> StaticScene<'a> {
     StaticScene {
         vertices: &data.vertices,
         vertex_address: world.vertex_buffer.address(),
-        relief_address: world.relief_address(),
+        mapped_address: world.mapped_address(),
         indices: &data.indices,
         surfaces: surfaces
             .map(|(s, number)| StaticSurface {

@@ -383,7 +383,7 @@ mod tests {
         let scene = StaticScene {
             vertices: &vertices,
             vertex_address: 0,
-            relief_address: 0,
+            mapped_address: 0,
             indices: &indices,
             surfaces,
             fogs: &[],

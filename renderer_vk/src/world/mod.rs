@@ -4,7 +4,7 @@ mod grid;
 mod load;
 mod marks;
 mod patch_lod;
-mod relief;
+mod tangents;
 mod tokens;
 mod visible;
 
@@ -203,8 +203,8 @@ pub struct World {
     pub index_buffer: Buffer,
     /// `types::Fog`; a surface's `fog` less one is the index.
     pub fog_buffer: Buffer,
-    /// `types::Relief`, parallel to the vertices; `None` until something needs it.
-    relief: Option<Buffer>,
+    /// `types::MappedVertex`, parallel to the vertices; `None` until something needs it.
+    mapped: Option<Buffer>,
     /// Light of the map for the traced look; `None` before the first traced view.
     lit: Option<Lit>,
     /// The current light before files changed it; `None` before the first traced view.
@@ -301,36 +301,40 @@ impl World {
             )?,
             fog_buffer: Buffer::with_data(device, "fogs", BufferUsage::STORAGE, &data.fogs)?,
             data,
-            relief: None,
+            mapped: None,
             lit: None,
             before: None,
         };
-        if settings.shows_relief() {
+        if settings.shows_surface_mapping() {
             world.read_materials(assets);
             if assets.materials.has_gloss(false) {
-                world.need_relief(device)?;
+                world.need_mapped_vertices(device)?;
             }
         }
         Ok(world)
     }
 
-    /// Address of what normal maps and highlights need of the vertices; 0 before
-    /// [`need_relief`](Self::need_relief).
-    pub fn relief_address(&self) -> u64 {
-        self.relief.as_ref().map_or(0, Buffer::address)
+    /// Address of the tangents and light directions of the vertices; 0 before
+    /// [`need_mapped_vertices`](Self::need_mapped_vertices).
+    pub fn mapped_address(&self) -> u64 {
+        self.mapped.as_ref().map_or(0, Buffer::address)
     }
 
     /// Computes tangents and light directions of the vertices, unless they exist.
     ///
     /// # Errors
     /// The device is out of memory.
-    pub fn need_relief(&mut self, device: &Device) -> Result<(), gpu::Error> {
-        if self.relief.is_none() {
+    pub fn need_mapped_vertices(&mut self, device: &Device) -> Result<(), gpu::Error> {
+        if self.mapped.is_none() {
             let begin = std::time::Instant::now();
-            let relief = self.data.relief();
-            let buffer =
-                Buffer::with_data(device, "relief of the world", BufferUsage::STORAGE, &relief)?;
-            self.relief = Some(buffer);
+            let mapped = self.data.mapped_vertices();
+            let buffer = Buffer::with_data(
+                device,
+                "tangents of the world",
+                BufferUsage::STORAGE,
+                &mapped,
+            )?;
+            self.mapped = Some(buffer);
             let seconds = begin.elapsed().as_secs_f32();
             log::debug!("{}: tangents took {seconds:.2} s", self.data.relit.name);
         }

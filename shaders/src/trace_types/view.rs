@@ -42,8 +42,8 @@ pub struct SceneView {
     pub portals: u64,
     /// A [`SkyRecord`](super::SkyRecord) for each sky material.
     pub skies: u64,
-    /// A [`Relief`](crate::types::Relief) for each vertex of the map; 0: none are known.
-    pub relief: u64,
+    /// A [`MappedVertex`](crate::types::MappedVertex) for each vertex of the map; 0: none are known.
+    pub mapped_vertices: u64,
     /// Top-level [`BvhNode`](super::BvhNode)s of the compute tracer; 0: no geometry.
     pub nodes: u64,
     /// A [`BvhInstance`](super::BvhInstance) for each leaf entry of those.

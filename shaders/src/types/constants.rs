@@ -165,16 +165,16 @@ pub const COLOR_WHITE: u32 = 0;
 pub const COLOR_FLAT: u32 = 1;
 pub const COLOR_VERTEX: u32 = 2;
 
-/// Relief of a draw, from normal maps and maps of reflection: source of the light that it varies (lowest bits; 0: no
-/// relief), whether it has normals and a highlight, and the shifts to 4 bits each for the stage with the texture and for
-/// that with the light, plus one; 0: the texture's stage has the light as its colour.
-pub const RELIEF_BAKED: u32 = 1;
-pub const RELIEF_OF_GRID: u32 = 2;
-pub const RELIEF_SOURCE: u32 = 3;
-pub const RELIEF_NORMALS: u32 = 4;
-pub const RELIEF_HIGHLIGHT: u32 = 8;
-pub const RELIEF_TEXTURE_SHIFT: u32 = 4;
-pub const RELIEF_LIGHT_SHIFT: u32 = 8;
+/// Normal and specular mapping of a draw: source of the light (lowest bits; 0: no mapping), whether there are a normal map
+/// and a highlight, and the shifts to 4 bits each for the stage with the texture and for that with the light, plus one; 0:
+/// the texture's stage has the light as its colour.
+pub const MAPPING_BAKED: u32 = 1;
+pub const MAPPING_OF_GRID: u32 = 2;
+pub const MAPPING_SOURCE: u32 = 3;
+pub const MAPPING_NORMALS: u32 = 4;
+pub const MAPPING_SPECULAR: u32 = 8;
+pub const MAPPING_TEXTURE_SHIFT: u32 = 4;
+pub const MAPPING_LIGHT_SHIFT: u32 = 8;
 
 pub const FOG_ADJUST_NONE: u32 = 0;
 pub const FOG_ADJUST_RGB: u32 = 1;

@@ -253,7 +253,7 @@ fn scene_view(
         fogs: geometry.map_or(0, |g| g.fogs.address()),
         portals: rec.arena().push(portals)?,
         skies: geometry.map_or(0, |g| g.skies.address()),
-        relief: geometry.map_or(0, |g| g.relief),
+        mapped_vertices: geometry.map_or(0, |g| g.mapped_vertices),
         nodes: accel.nodes,
         placed: accel.placed,
         top_level: accel.scene,

@@ -426,7 +426,7 @@ impl Scene {
         let scene = StaticScene {
             vertices: &self.vertices,
             vertex_address: vertices.address(),
-            relief_address: 0,
+            mapped_address: 0,
             indices: &self.indices,
             surfaces: self.surfaces.clone(),
             fogs: &self.fogs,

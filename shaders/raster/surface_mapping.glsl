@@ -1,37 +1,28 @@
-// Relief of a draw: a normal map and a highlight vary the baked light of a surface, or the light of the grid on a model.
+// Normal and specular mapping of a draw, under the baked light of a surface or the light of the grid on a model.
 // Source: `lightall_fp.glsl` and `lightall_vp.glsl` of ioquake3's `opengl2`, without cube maps and parallax.
 
 // Part of the baked light that has the direction of `in_light`; the rest has none.
 const float DIRECTED_PART = 0.75;
-// Largest factor by which the directed part is divided for the angle at which the baked light arrived.
+// The directed part is divided by the cosine at which the baked light arrived, at least by this.
 const float LEAST_INCIDENCE = 0.25;
 // `r_deluxeSpecular`, its default: exponent of the roughness under baked light, factor of the highlight under the grid's.
 const float HIGHLIGHT = 0.3;
 // The lobe of less roughness is smaller than a pixel.
 const float LEAST_ROUGHNESS = 0.05;
 
-vec3 unit(vec3 v, vec3 otherwise) {
-    float squared = dot(v, v);
-    return squared > 1.0e-30 ? v * inversesqrt(squared) : otherwise;
-}
-
 vec2 texture_uv() { return (TEXTURE_STAGE & 1) == 0 ? in_uv[TEXTURE_STAGE / 2].xy : in_uv[TEXTURE_STAGE / 2].zw; }
 
 vec4 map_texel(uint map, uint map_sampler) { return texture(sampler2D(textures[map], samplers[map_sampler]), texture_uv()); }
 
 // The mapped normal. Tangents are those of the vertices, or else those of the triangle.
-vec3 relief_normal(Specular specular, vec3 normal, vec3 to_viewer) {
+vec3 mapped_normal(Specular specular, vec3 normal, vec3 to_viewer) {
     vec3 px = -dFdx(to_viewer), py = -dFdy(to_viewer);
     vec2 sx = dFdx(texture_uv()), sy = dFdy(texture_uv());
     float turn = sign(sx.x * sy.y - sx.y * sy.x);
     vec3 along_s = (px * sy.y - py * sx.y) * turn, along_t = (py * sx.x - px * sy.x) * turn;
     vec3 tangent = in_tangent.xyz == vec3(0.0) ? along_s : in_tangent.xyz;
-    tangent = unit(tangent - normal * dot(normal, tangent), vec3(0.0));
-    // t points down in texture coordinates, up in normal maps
-    vec3 up = cross(normal, tangent);
-    if (dot(up, along_t) > 0.0) up = -up;
-    vec2 local = (map_texel(specular.normals, specular.sampler_index).xy * 2.0 - 1.0) * specular.normal_scale;
-    return unit(tangent * local.x + up * local.y + normal * sqrt(max(1.0 - dot(local, local), 0.0)), normal);
+    vec2 texel = map_texel(specular.normals, specular.sampler_index).xy;
+    return normal_from_map(normal, tangent, along_t, texel, specular.normal_scale);
 }
 
 // A surface of a texture. Metal scatters as its texture would: the look reflects no surroundings, without which metal is
@@ -64,29 +55,29 @@ float lobe(float normal_half, float view_half, float roughness) {
     return squared / (4.0 * d * d * v);
 }
 
-// `color`: the texture under its light, without relief.
-vec4 with_relief(vec4 color) {
+// `color`: the texture under its light, without maps.
+vec4 mapped_color(vec4 color) {
     Draws draws = Draws(VIEW.draws);
     uint draw = in_textures.x;
     Material material = Materials(VIEW.materials.materials).at[draws.at[draw].material];
     vec3 to_viewer = vec3(in_normal.w, in_tangent.w, in_light.w);
-    vec3 view = unit(to_viewer, vec3(0.0, 0.0, 1.0));
+    vec3 view = safe_normalize(to_viewer, vec3(0.0, 0.0, 1.0));
     // of both sides of a surface, the one that is seen
     vec3 face = cross(dFdx(to_viewer), dFdy(to_viewer));
     if (dot(face, view) < 0.0) face = -face;
-    vec3 flat_normal = unit(in_normal.xyz, unit(face, view));
+    vec3 flat_normal = safe_normalize(in_normal.xyz, safe_normalize(face, view));
     if (dot(flat_normal, face) < 0.0) flat_normal = -flat_normal;
-    vec3 light = unit(in_light.xyz, flat_normal);
-    vec3 normal = (RELIEF & RELIEF_NORMALS) == 0 ? flat_normal : relief_normal(material.specular, flat_normal, to_viewer);
+    vec3 light = safe_normalize(in_light.xyz, flat_normal);
+    vec3 normal = (MAPPING & MAPPING_NORMALS) == 0 ? flat_normal : mapped_normal(material.specular, flat_normal, to_viewer);
     float incidence = clamp(dot(normal, light), 0.0, 1.0);
 
     Reflecting surface = Reflecting(vec3(0.0), vec3(1.0), 1.0);
-    if ((RELIEF & RELIEF_HIGHLIGHT) != 0) surface = reflecting(material.specular, material.flags, sample_stage(TEXTURE_STAGE).rgb);
+    if ((MAPPING & MAPPING_SPECULAR) != 0) surface = reflecting(material.specular, material.flags, sample_stage(TEXTURE_STAGE).rgb);
 
     vec3 whole; // light over that of `color`
     vec3 directed;
     float roughness = surface.roughness, strength = 1.0;
-    if ((RELIEF & RELIEF_SOURCE) == RELIEF_OF_GRID) {
+    if ((MAPPING & MAPPING_SOURCE) == MAPPING_OF_GRID) {
         Instance instance = Instances(VIEW.instances).at[draws.at[draw].instance];
         bool lit = (instance.flags & INSTANCE_UNLIT) == 0;
         directed = lit ? instance.directed : vec3(0.0);
@@ -101,15 +92,15 @@ vec4 with_relief(vec4 color) {
         roughness = pow(roughness, HIGHLIGHT);
     }
     color.rgb *= surface.scattered * whole;
-    if ((RELIEF & RELIEF_HIGHLIGHT) != 0) {
-        vec3 middle = unit(light + view, normal);
+    if ((MAPPING & MAPPING_SPECULAR) != 0) {
+        vec3 middle = safe_normalize(light + view, normal);
         float normal_half = clamp(dot(normal, middle), 0.0, 1.0), view_half = clamp(dot(view, middle), 0.0, 1.0);
         color.rgb += directed * surface.reflectance * (lobe(normal_half, view_half, max(roughness, LEAST_ROUGHNESS)) * strength * incidence);
     }
     return color;
 }
 
-// Applies relief to the stages up to `stage`, if these are the texture and its light.
-vec4 relief_after(uint stage, vec4 color) {
-    return RELIEF != 0 && stage + 1 == max(TEXTURE_STAGE + 1, LIGHT_STAGE) ? with_relief(color) : color;
+// Applies the maps to the stages up to `stage`, if these are the texture and its light.
+vec4 mapped_after(uint stage, vec4 color) {
+    return MAPPING != 0 && stage + 1 == max(TEXTURE_STAGE + 1, LIGHT_STAGE) ? mapped_color(color) : color;
 }

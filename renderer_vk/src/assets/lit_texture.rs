@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_relief() {
+    fn what_shows_no_maps() {
         use LightmapClass::Page;
         assert_eq!(found("{ map a.tga }", Page), None);
         assert_eq!(found("{ map $lightmap }", Page), None);

@@ -2,7 +2,7 @@
 
 use bevy_mikktspace::{Geometry, TangentSpace};
 use glam::{Vec2, Vec3};
-use shaders::types::{Relief, Vertex};
+use shaders::types::{MappedVertex, Vertex};
 
 use super::WorldData;
 
@@ -11,10 +11,10 @@ use super::WorldData;
 const LEAST_COSINE: f32 = 0.2;
 
 impl WorldData {
-    /// [`Relief`] of each vertex.
-    pub(super) fn relief(&self) -> Vec<Relief> {
-        let mut relief: Vec<Relief> = (self.vertices.iter())
-            .map(|vertex| Relief {
+    /// [`MappedVertex`] of each vertex.
+    pub(super) fn mapped_vertices(&self) -> Vec<MappedVertex> {
+        let mut mapped: Vec<MappedVertex> = (self.vertices.iter())
+            .map(|vertex| MappedVertex {
                 tangent: Vec3::ZERO,
                 light: self.light_direction(vertex),
             })
@@ -39,8 +39,8 @@ impl WorldData {
             .flat_map(|indices| indices.as_chunks::<3>().0)
             .copied()
             .collect();
-        tangents(&self.vertices, &triangles, &mut relief);
-        relief
+        tangents(&self.vertices, &triangles, &mut mapped);
+        mapped
     }
 
     fn light_direction(&self, vertex: &Vertex) -> Vec3 {
@@ -54,11 +54,11 @@ impl WorldData {
 
 /// MikkTSpace's tangents. A vertex has one tangent: where triangles of mirrored texture coordinates share it, that of the
 /// first.
-fn tangents(vertices: &[Vertex], triangles: &[[u32; 3]], relief: &mut [Relief]) {
+fn tangents(vertices: &[Vertex], triangles: &[[u32; 3]], mapped: &mut [MappedVertex]) {
     let mut mesh = Mesh {
         vertices,
         triangles,
-        relief,
+        mapped,
     };
     // it has no errors
     let _ = bevy_mikktspace::generate_tangents(&mut mesh);
@@ -67,7 +67,7 @@ fn tangents(vertices: &[Vertex], triangles: &[[u32; 3]], relief: &mut [Relief]) 
 struct Mesh<'a> {
     vertices: &'a [Vertex],
     triangles: &'a [[u32; 3]],
-    relief: &'a mut [Relief],
+    mapped: &'a mut [MappedVertex],
 }
 
 impl Mesh<'_> {
@@ -122,7 +122,7 @@ impl Geometry for Mesh<'_> {
     fn set_tangent(&mut self, space: Option<TangentSpace>, face: usize, corner: usize) {
         let index = self.index(face, corner);
         let (Some(space), Some(found)) =
-            (space, index.and_then(|index| self.relief.get_mut(index)))
+            (space, index.and_then(|index| self.mapped.get_mut(index)))
         else {
             return;
         };
@@ -146,9 +146,9 @@ mod tests {
     }
 
     fn found(vertices: &[Vertex], triangles: &[[u32; 3]]) -> Vec<Vec3> {
-        let mut relief = vec![Relief::default(); vertices.len()];
-        tangents(vertices, triangles, &mut relief);
-        relief.iter().map(|r| r.tangent).collect()
+        let mut mapped = vec![MappedVertex::default(); vertices.len()];
+        tangents(vertices, triangles, &mut mapped);
+        mapped.iter().map(|r| r.tangent).collect()
     }
 
     #[test]
