@@ -1,10 +1,13 @@
-//! The tables of variables in `docs/src/settings`. `RELIGHT_UPDATE=1 cargo test -p ffi cvars::document` writes them.
+//! The tables of variables in the book. `RELIGHT_UPDATE=1 cargo test -p ffi cvars::document` writes them.
 
 use std::path::Path;
 
 use super::tests::{KNOWN, specs};
 use super::{UNUSED, flags};
 use renderer_vk::settings::{Kind, PRESETS, Preset, Spec};
+
+/// Settings that exist to compare techniques. The page that compares them has their table, not that of players.
+const COMPARED: [&str; 1] = ["rt_gridCells"];
 
 /// A row of a table. The help of variables without effect ends with a sentence that their table states once.
 fn line(spec: &Spec) -> String {
@@ -34,7 +37,7 @@ fn line(spec: &Spec) -> String {
 /// A table: the page that holds it, its name in the comments around it, its rows.
 type Table = (&'static str, &'static str, Vec<&'static Spec>);
 
-fn tables() -> [Table; 4] {
+fn tables() -> [Table; 5] {
     let is_known = |spec: &&Spec| {
         let mut names = KNOWN.lines().filter_map(|line| line.split(' ').next());
         names.any(|name| name == spec.name)
@@ -42,12 +45,19 @@ fn tables() -> [Table; 4] {
     let is_traced = |spec: &&Spec| spec.name == "r_rt" || spec.name.starts_with("rt_");
     let used = specs().filter(|spec| !UNUSED.iter().any(|u| u.name == spec.name));
     let (known, ours): (Vec<_>, Vec<_>) = used.partition(is_known);
+    let is_compared = |spec: &&Spec| COMPARED.contains(&spec.name);
+    let (compared, ours): (Vec<_>, Vec<_>) = ours.into_iter().partition(is_compared);
     let (traced, others): (Vec<_>, Vec<_>) = ours.into_iter().partition(is_traced);
     [
-        ("engine.md", "engine", known),
-        ("engine.md", "without effect", UNUSED.iter().collect()),
-        ("renderer.md", "traced look", traced),
-        ("renderer.md", "device and classic look", others),
+        ("settings/engine.md", "engine", known),
+        (
+            "settings/engine.md",
+            "without effect",
+            UNUSED.iter().collect(),
+        ),
+        ("settings/renderer.md", "traced look", traced),
+        ("settings/renderer.md", "device and classic look", others),
+        ("how/techniques.md", "compared", compared),
     ]
 }
 
@@ -112,9 +122,13 @@ fn the_page_of_presets_has_their_table() {
 #[test]
 fn the_pages_have_the_tables() {
     let tables = tables();
-    for name in ["engine.md", "renderer.md"] {
+    for name in [
+        "settings/engine.md",
+        "settings/renderer.md",
+        "how/techniques.md",
+    ] {
         let of_page = tables.iter().filter(|(holder, ..)| *holder == name);
-        check_page(&format!("settings/{name}"), |page| {
+        check_page(name, |page| {
             of_page.fold(page.to_owned(), |page, (_, table, rows)| {
                 with_table(&page, table, rows)
             })
