@@ -195,7 +195,7 @@ settings! { variables {
     rt_flashlight: bool = "rt_flashlight", "0", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "1 carries a lamp at the camera.";
     rt_light_scale: f32 = "rt_lightScale", "1", ARCHIVE, kept(0.0, 100.0), Frame, Restarts, "Multiplies every light of the map when it is traced.";
     rt_dlight_scale: f32 = "rt_dlightScale", "1", ARCHIVE, kept(0.0, 100.0), Frame, Restarts, "Multiplies lights of explosions, missiles and items when they are traced.";
-    rt_debug: DebugOutput = "rt_debug", "0", NONE, kept(0.0, 11.0), Frame, GoesOn, "Shows a step of the traced look in place of the picture: 1 albedo, 2 normals, 3 depth, 4 motion, 5 clusters, 6 lights per pixel, 7 samples, 8 variance, 9 gradients, 10 rays per pixel, 11 reflections.";
+    rt_debug: DebugOutput = "rt_debug", "0", NONE, kept(0.0, 13.0), Frame, GoesOn, "Shows a step of the traced look: 1 albedo, 2 normals, 3 depth, 4 motion, 5 clusters, 6 lights per pixel, 7 samples, 8 variance, 9 gradients, 10 rays per pixel, 11 reflections, 12 time, 13 time of rays.";
 
 } others {
     /// Temporal gradients of A-SVGF. Measurements compare with them off.

@@ -1,6 +1,7 @@
 #version 460
 // Shades the hits of `bounce_rays.rgen` and samples a light for each; `bounce_light.rgen` traces the shadow rays.
 #include "trace/bounce_ray.glsl"
+#include "trace/clock.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -60,4 +61,5 @@ void main() {
     }
     bounce_light_write(cell, b, random);
     if (LAST_BOUNCE == 0) bounce_vertex_write(cell, v, onward ? throughput : vec3(0.0));
+    add_pixel_time(pixel);
 }

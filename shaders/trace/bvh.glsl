@@ -207,10 +207,8 @@ void bvh_walk(inout BvhWalk walk, vec3 origin, uint mask) {
     }
 }
 
-// The nearest hit of the mask between tmin and tmax, without translucent surfaces. With `any_hit` only `geometry` is
-// valid: NO_HIT if the ray hits nothing.
-Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bool any_hit) {
-    ray_count++;
+// See `trace_ray`.
+Hit follow_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bool any_hit) {
     BvhWalk walk;
     walk.mode = any_hit ? BVH_ANY : BVH_CLOSEST;
     walk.tmin = tmin;
@@ -221,10 +219,8 @@ Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bo
     return walk.hit;
 }
 
-// The next translucent layers behind `order` and before tmax. Layers in one plane are ordered as the engine draws them,
-// the last drawn first.
-void trace_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder order, out LayerList found) {
-    ray_count++;
+// See `trace_layers`.
+void follow_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder order, out LayerList found) {
     BvhWalk walk;
     walk.mode = BVH_LAYER;
     walk.tmin = layer_start(order);

@@ -3,15 +3,18 @@
 #define RELIGHT_TRACE_COUNT_GLSL
 
 #include "trace/view.glsl"
+#include "trace/clock.glsl"
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer RayCounters { uint at[]; };
 
-// Rays of this invocation; every tracer function that starts a ray increments it.
+// Rays of this invocation.
 uint ray_count = 0;
 
 // Adds the rays of this invocation to the counters of its pass (`COUNT_*`) and to the count of its pixel, which the
-// first pass resets.
+// first pass resets; and its time to that of the pixel.
 void count_rays(ivec2 pixel, uint pass, bool first) {
+    if (first) begin_pixel_time(pixel);
+    add_pixel_time(pixel);
     if (VIEW.post.counters != 0 && ray_count > 0) {
         // several counters per pass reduce contention and prevent overflow
         uint row = uint(pixel.y) % COUNTER_ROWS;

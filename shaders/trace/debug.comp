@@ -6,6 +6,11 @@
 #include "trace/motion.glsl"
 #include "trace/picture.glsl"
 
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer TimeSums { uint at[]; };
+
+// Sums of doublings are integers of this fraction: 2^32 hold those of 16 million pixels.
+const float TIME_SUM_SCALE = 8.0;
+
 layout(local_size_x = 8, local_size_y = 8) in;
 
 const vec3 NOTHING = vec3(0.1, 0.1, 0.1);
@@ -21,6 +26,26 @@ vec3 heat(float t) {
 
 // A count as `heat`: one step for each doubling of 1 + count; 2^steps is white.
 vec3 heat_count(float count, float steps) { return heat(log2(1.0 + count) / steps); }
+
+// Ticks of a pixel as `heat` beside the mean of their logarithms in the last frame: green is the mean, a step is a factor
+// of 2. Pixels of a cell share their time, because one of them gathers bounced light.
+vec3 heat_time(ivec2 pixel) {
+    if (VIEW.post.image_time == NO_IMAGE) return NOTHING;
+    ivec2 size = ivec2(VIEW.width, VIEW.height);
+    float ticks = 0.0;
+    for (int i = 0; i < 4; i++) {
+        ivec2 place = min((pixel & ~1) + ivec2(i & 1, i >> 1), size - 1);
+        ticks += float(imageLoad(uimages_r32ui[VIEW.post.image_time], place).x) / float(4 * TIMED_FRAMES);
+    }
+    float doublings = log2(1.0 + ticks);
+    TimeSums sums = TimeSums(VIEW.post.time_sums);
+    atomicAdd(sums.at[2 * VIEW.post.time_turn], uint(doublings * TIME_SUM_SCALE + 0.5));
+    atomicAdd(sums.at[2 * VIEW.post.time_turn + 1], 1u);
+    uint before = 2 * (1 - VIEW.post.time_turn);
+    if (sums.at[before + 1] == 0) return NOTHING;
+    float mean = float(sums.at[before]) / (TIME_SUM_SCALE * float(sums.at[before + 1]));
+    return heat((doublings - mean) / 6.0 + 0.5);
+}
 
 // Colour of an angle, full circle.
 vec3 hue(float angle) {
@@ -86,6 +111,8 @@ vec3 debug_color(ivec2 pixel) {
     case DEBUG_RAYS:
         if (VIEW.post.image_rays == NO_IMAGE) return NOTHING;
         return heat_count(float(imageLoad(uimages_r32ui[VIEW.post.image_rays], pixel).x), 8.0);
+    case DEBUG_TIME:
+    case DEBUG_RAY_TIME: return heat_time(pixel);
     case DEBUG_SPECULAR: return specular_color(pixel, g);
     }
     return NOTHING;

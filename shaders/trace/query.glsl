@@ -9,10 +9,8 @@
         uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, committed)), rayQueryGetIntersectionBarycentricsEXT(query, committed), \
         rayQueryGetIntersectionTEXT(query, committed))
 
-// The nearest hit of the mask between tmin and tmax, without translucent surfaces. With `any_hit` only `geometry` is
-// valid: NO_HIT if the ray hits nothing.
-Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bool any_hit) {
-    ray_count++;
+// See `trace_ray`.
+Hit follow_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bool any_hit) {
     rayQueryEXT query;
     uint flags = any_hit ? gl_RayFlagsTerminateOnFirstHitEXT : gl_RayFlagsNoneEXT;
     rayQueryInitializeEXT(query, scenes[VIEW.scene.top_level], flags, mask, origin, tmin, direction, tmax);
@@ -24,10 +22,8 @@ Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bo
     return QUERY_HIT(query, true);
 }
 
-// The next translucent layers behind `order` and before tmax. Layers in one plane are ordered as the engine draws them,
-// the last drawn first.
-void trace_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder order, out LayerList found) {
-    ray_count++;
+// See `trace_layers`.
+void follow_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder order, out LayerList found) {
     layers_clear(found);
     rayQueryEXT query;
     rayQueryInitializeEXT(query, scenes[VIEW.scene.top_level], gl_RayFlagsNoneEXT, mask, origin, layer_start(order), direction, tmax);

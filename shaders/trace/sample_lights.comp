@@ -6,6 +6,7 @@
 #include "trace/gradient_reproject.glsl"
 #include "trace/sampled_light.glsl"
 #include "trace/suns.glsl"
+#include "trace/clock.glsl"
 
 layout(local_size_x = RAY_TILE, local_size_y = RAY_TILE) in;
 
@@ -30,6 +31,8 @@ void main() {
             sun = set.suns > 0 && max_component(sun_sample(task).light) > 0.0;
         }
     }
+    // not the wait for the work group
+    if (inside(pixel)) add_pixel_time(pixel);
     uint slot = ray_slot(sampled.direction, max_component(sampled.light) > 0.0);
     sampled_light_write(slot, gl_LocalInvocationID.xy, compacted_place(slot, sun), sampled, random);
 }

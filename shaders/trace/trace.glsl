@@ -39,10 +39,8 @@ Hit payload_hit() {
     return Hit(payload.geometry, payload.primitive, payload.barycentrics, payload.t);
 }
 
-// The nearest hit of the mask between tmin and tmax, without translucent surfaces. With `any_hit` only `geometry` is
-// valid: NO_HIT if the ray hits nothing.
-Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bool any_hit) {
-    ray_count++;
+// See `trace_ray`.
+Hit follow_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bool any_hit) {
     // the miss shader reports NO_HIT; without a report the ray is blocked
     payload.geometry = any_hit ? 0 : NO_HIT;
     uint flags = any_hit ? gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT : gl_RayFlagsNoneEXT;
@@ -50,10 +48,8 @@ Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bo
     return payload_hit();
 }
 
-// The next translucent layers behind `order` and before tmax. Layers in one plane are ordered as the engine draws them,
-// the last drawn first.
-void trace_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder order, out LayerList found) {
-    ray_count++;
+// See `trace_layers`.
+void follow_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder order, out LayerList found) {
     layers_clear(layer_payload.found);
     layer_payload.last = order;
     const uint missed = 1;
@@ -64,6 +60,25 @@ void trace_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder
 #endif
 
 #ifndef TRACER_NONE
+// The nearest hit of the mask between tmin and tmax, without translucent surfaces. With `any_hit` only `geometry` is
+// valid: NO_HIT if the ray hits nothing.
+Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bool any_hit) {
+    ray_count++;
+    uint start = clock_now();
+    Hit hit = follow_ray(origin, tmin, direction, tmax, mask, any_hit);
+    ray_ticks += clock_now() - start;
+    return hit;
+}
+
+// The next translucent layers behind `order` and before tmax. Layers in one plane are ordered as the engine draws them,
+// the last drawn first.
+void trace_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder order, out LayerList found) {
+    ray_count++;
+    uint start = clock_now();
+    follow_layers(origin, direction, tmax, mask, order, found);
+    ray_ticks += clock_now() - start;
+}
+
 // See `no_rays.glsl`.
 const bool rays_needed = false;
 const bool HAS_RAYS = true;

@@ -41,6 +41,7 @@ mod ray_tracing;
 mod recorder;
 mod render_pass;
 mod select;
+mod spirv;
 mod swapchain;
 mod timers;
 mod tlas;

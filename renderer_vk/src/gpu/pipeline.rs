@@ -13,6 +13,7 @@ use super::error::{Context, Error};
 use super::graveyard::Garbage;
 use super::image::Format;
 use super::render_pass::RenderPassKey;
+use super::spirv::without_clock;
 
 /// Parameters of a [`GraphicsPipeline`].
 #[derive(Clone, Copy, Debug)]
@@ -160,8 +161,12 @@ pub(crate) struct Module {
 
 impl Module {
     pub fn new(device: &Device, code: &Spirv) -> Result<Self, Error> {
-        let info = vk::ShaderModuleCreateInfo::default().code(code.words());
-        // SAFETY: the words are a module that glslang made for this Vulkan version.
+        let words = match device.info().shader_clock {
+            true => code.words().into(),
+            false => without_clock(code.words()),
+        };
+        let info = vk::ShaderModuleCreateInfo::default().code(&words);
+        // SAFETY: the words are a module that glslang made for this Vulkan version, without what the device lacks.
         let raw = unsafe { device.vk().create_shader_module(&info, None) }
             .context("vkCreateShaderModule")?;
         device.0.name(raw, code.name());

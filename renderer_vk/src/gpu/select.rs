@@ -64,6 +64,8 @@ pub struct DeviceInfo {
     pub ray_query: bool,
     /// Whether passes are timed.
     pub timestamps: bool,
+    /// Whether shaders can read the clock of their subgroup (`VK_KHR_shader_clock`).
+    pub shader_clock: bool,
     /// Maximum anisotropy; `None` without the feature.
     pub anisotropy: Option<f32>,
     /// Whether triangles can be drawn as lines.
@@ -109,6 +111,7 @@ pub(crate) struct Abilities {
     pub storage16: bool,
     pub storage8: bool,
     pub dynamic_state: bool,
+    pub shader_clock: bool,
 }
 
 /// The selected device.
@@ -185,6 +188,9 @@ pub(crate) fn create_device(instance: &Instance, choice: &Choice) -> Result<ash:
         extensions.push(ext::extended_dynamic_state::NAME.as_ptr());
         extensions.push(ext::extended_dynamic_state3::NAME.as_ptr());
     }
+    if a.shader_clock {
+        extensions.push(khr::shader_clock::NAME.as_ptr());
+    }
     let features = vk::PhysicalDeviceFeatures::default()
         .shader_int64(true)
         .shader_sampled_image_array_dynamic_indexing(true)
@@ -227,6 +233,8 @@ pub(crate) fn create_device(instance: &Instance, choice: &Choice) -> Result<ash:
         .extended_dynamic_state3_color_blend_equation(true);
     let mut f_id = vk::PhysicalDevicePresentIdFeaturesKHR::default().present_id(true);
     let mut f_wait = vk::PhysicalDevicePresentWaitFeaturesKHR::default().present_wait(true);
+    let mut f_clock =
+        vk::PhysicalDeviceShaderClockFeaturesKHR::default().shader_subgroup_clock(true);
     let priorities = [1.0];
     let queues = [vk::DeviceQueueCreateInfo::default()
         .queue_family_index(choice.queue_family)
@@ -251,6 +259,9 @@ pub(crate) fn create_device(instance: &Instance, choice: &Choice) -> Result<ash:
     }
     if a.dynamic_state {
         info = info.push_next(&mut f_dynamic).push_next(&mut f_dynamic3);
+    }
+    if a.shader_clock {
+        info = info.push_next(&mut f_clock);
     }
     // SAFETY: features and extensions are ones that `examine` found on this device; pointers live here.
     unsafe { instance.raw.create_device(choice.physical, &info, None) }.context("vkCreateDevice")

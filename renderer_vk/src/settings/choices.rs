@@ -80,6 +80,10 @@ numbered! {
         Rays = t::DEBUG_RAYS,
         /// Reflections and refractions: mirrors, portals, glass, liquids and glossy surfaces.
         Specular = t::DEBUG_SPECULAR,
+        /// Time of each pixel's invocations, without the filters.
+        Time = t::DEBUG_TIME,
+        /// The part of it that rays take.
+        RayTime = t::DEBUG_RAY_TIME,
     }
 }
 

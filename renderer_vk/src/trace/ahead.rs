@@ -119,6 +119,7 @@ fn states(pass: Pass, settings: &Settings, needs: MapNeeds) -> Vec<usize> {
             Switch::MapFog | Switch::LitFog => needs.fog,
             Switch::Gloss => needs.has_gloss(settings),
             Switch::Caustics => needs.bodies && photons::in_use(settings),
+            Switch::Timed => false,
         };
         if !on {
             continue;

@@ -30,6 +30,8 @@ pub struct FrameFacts {
     pub bounces: bool,
     /// Materials are rough or have normal maps.
     pub gloss: bool,
+    /// The time of pixels is measured.
+    pub timed: bool,
 }
 
 impl FrameFacts {
@@ -40,6 +42,7 @@ impl FrameFacts {
             Switch::Bounces => self.bounces,
             Switch::Gloss => self.gloss,
             Switch::Caustics => self.photons > 0,
+            Switch::Timed => self.timed,
         }
     }
 

@@ -46,6 +46,7 @@ mod parts;
 pub mod pass_set;
 pub mod passes;
 mod photons;
+mod pixel_times;
 mod shapes;
 mod solids;
 mod specular;

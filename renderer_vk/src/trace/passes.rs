@@ -57,6 +57,8 @@ pub enum Switch {
     Gloss,
     /// Photons bring the light that crosses refracting bodies.
     Caustics,
+    /// A view of `rt_debug` shows the time of pixels.
+    Timed,
 }
 
 /// Data that passes exchange within a frame.
@@ -219,7 +221,7 @@ macro_rules! passes {
         /// Declarations, in the order of [`Pass`].
         pub static TABLE: &[Row] = {
             #[allow(clippy::enum_glob_use)] // rows name many of them
-            use {Resource::*, Shader::{Compute, Rays}, Switch::{Bounces, Caustics, Gloss, LitFog, MapFog}};
+            use {Resource::*, Shader::{Compute, Rays}, Switch::{Bounces, Caustics, Gloss, LitFog, MapFog, Timed}};
             &[$(Row { $($field: $value,)* ..Row::of(concat!($($about),+), $name, $shader, Size::$size) }),+]
         };
     };
@@ -228,20 +230,21 @@ macro_rules! passes {
 passes! {
     /// First hits of the camera's rays.
     PrimaryRays = "trace_primary_rays", Rays(&shaders::TRACE_PRIMARY_RAYS), Traced {
+        switches: &[(ids::clock::TIMED, Timed)],
         reads: &[Scene],
         writes: &[PrimaryHits],
         counter: Some(t::COUNT_PRIMARY_RAYS),
     }
     /// `Primary` compiled without rays: finishes the many pixels that show the surface of their first hit.
     PrimarySimple = "trace_primary_simple", Compute(&shaders::TRACE_PRIMARY_RGEN_NO_RAYS), Traced {
-        switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss)],
+        switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed)],
         reads: &[Scene, PrimaryHits],
         writes: &[GBuffer, Positions, Normals, Shown, FogWeights, FogPoints, GlossSurfaces],
     }
     /// The surface that each other pixel shows behind mirrors, portals, glass and liquids, with the layers in front of
     /// it.
     Primary = "trace_primary", Rays(&shaders::TRACE_PRIMARY), Traced {
-        switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss)],
+        switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed)],
         reads: &[Scene, PrimaryHits],
         writes: &[GBuffer, Positions, Normals, Shown, FogWeights, FogPoints, GlossSurfaces],
         counter: Some(t::COUNT_PRIMARY),
@@ -249,7 +252,7 @@ passes! {
     /// The side of glass or of a glossy surface that a pixel does not show.
     OtherSide = "trace_other_side", Rays(&shaders::TRACE_PRIMARY), Traced {
         shares: Some(Pass::Primary),
-        switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss)],
+        switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed)],
         reads: &[Scene, PrimaryHits, GBuffer],
         writes: &[Other],
     }
@@ -277,6 +280,7 @@ passes! {
     }
     /// Samples one light for each pixel, and sorts the rays of a tile by direction.
     SampleLights = "trace_sample_lights", Compute(&shaders::TRACE_SAMPLE_LIGHTS_COMP), Traced {
+        switches: &[(ids::clock::TIMED, Timed)],
         reads: &[Lights, GBuffer, Positions, Normals],
         may_read: &[GradientPixels],
         writes: &[SampledLights],
@@ -284,7 +288,7 @@ passes! {
     /// Shadow rays to the sampled lights.
     SampledDirect = "trace_direct", Rays(&shaders::TRACE_DIRECT), RayTiles {
         constants: &[(ids::direct::SAMPLING, t::SAMPLING_LIGHT)],
-        switches: &[(ids::photons::CAUSTICS, Caustics)],
+        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, SampledLights],
         may_read: &[GradientPixels, PhotonCells],
         writes: &[DirectLight],
@@ -293,7 +297,7 @@ passes! {
     /// Shadow rays to suns, whose light is added.
     Suns = "trace_suns", Rays(&shaders::TRACE_DIRECT), RayTiles {
         constants: &[(ids::direct::SAMPLING, t::SAMPLING_SUNS)],
-        switches: &[(ids::photons::CAUSTICS, Caustics)],
+        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, SampledLights, DirectLight],
         may_read: &[GradientPixels, PhotonCells],
         writes: &[DirectLight],
@@ -301,7 +305,7 @@ passes! {
     }
     /// Direct light where a pixel samples several lights or all.
     Direct = "trace_direct", Rays(&shaders::TRACE_DIRECT), Traced {
-        switches: &[(ids::photons::CAUSTICS, Caustics)],
+        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals],
         may_read: &[GradientPixels, PhotonCells],
         writes: &[DirectLight],
@@ -309,7 +313,7 @@ passes! {
     }
     /// Light that flat mirrors of the map reflect onto the surfaces from which a bounce starts.
     MirrorLight = "trace_mirror_light", Rays(&shaders::TRACE_MIRROR_LIGHT), Cells {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals],
         may_read: &[GradientPixels, BounceLights],
         writes: &[BounceLights],
@@ -317,7 +321,7 @@ passes! {
     }
     /// Rays of a bounce.
     BounceRays = "trace_bounce_rays", Rays(&shaders::TRACE_BOUNCE_RAYS), Cells {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed)],
         reads: &[Scene, GBuffer, Positions, Normals],
         may_read: &[GradientPixels, BounceLights, GlossSurfaces],
         writes: &[BounceHits],
@@ -325,7 +329,7 @@ passes! {
     }
     /// Shades what they hit, and samples a light for it.
     BounceShade = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
-        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics)],
+        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
         may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells],
         writes: &[BounceLights, GlossSurfaces],
@@ -333,14 +337,14 @@ passes! {
     /// The same of the last bounce, after which no path goes on.
     BounceShadeLast = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
         constants: &[(ids::bounce::LAST_BOUNCE, 1)],
-        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics)],
+        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
         may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells],
         writes: &[BounceLights, GlossSurfaces],
     }
     /// Shadow rays to those lights; the last writes the light of the paths, of one of both kinds.
     BounceLight = "trace_bounce_light", Rays(&shaders::TRACE_BOUNCE_LIGHT), Cells {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceLights],
         may_read: &[GradientPixels, GlossSurfaces],
         writes: &[IndirectLight, GlossLight],
@@ -349,6 +353,7 @@ passes! {
     /// Specular light of sampled lights at rough surfaces. The passes of a bounce then trace its other paths.
     SpecularLight = "trace_specular_light", Rays(&shaders::TRACE_SPECULAR_LIGHT), Cells {
         constants: &[(ids::specular::HAS_GLOSS, 1)],
+        switches: &[(ids::clock::TIMED, Timed)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, GlossSurfaces],
         writes: &[BounceLights],
         counter: Some(t::COUNT_SPECULAR),

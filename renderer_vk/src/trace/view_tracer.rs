@@ -23,6 +23,7 @@ use super::motion::Motion;
 use super::pass_set::PassSet;
 use super::passes::{COUNTERS, Pass, Resource};
 use super::photons::{self, Photons};
+use super::pixel_times::PixelTimes;
 use super::specular::SpecularTable;
 use super::targets::{OwnImages, Targets};
 use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
@@ -74,6 +75,7 @@ pub struct ViewTracer {
     bloom: Bloom,
     pub(super) photons: Photons,
     counters: RayCounters,
+    pixel_times: PixelTimes,
     specular_table: SpecularTable,
     /// Estimator of specular light (`SPECULAR_*`).
     pub(super) specular_estimator: u32,
@@ -124,6 +126,7 @@ impl ViewTracer {
             bloom: Bloom::default(),
             photons: Photons::default(),
             counters: RayCounters::default(),
+            pixel_times: PixelTimes::default(),
             specular_table: SpecularTable::default(),
             specular_estimator: t::SPECULAR_BOTH,
             channels: 7,
@@ -301,16 +304,20 @@ impl ViewTracer {
         let motion = (self.motion).record(rec, scene, &portals, vertices, targets, camera_rests)?;
         let show_rays = settings.rt_debug == DebugOutput::Rays;
         let counting = (self.counters).begin(rec, size, self.count_rays, show_rays)?;
+        let timing = self.pixel_times.begin(rec, size, settings.rt_debug)?;
         let antialias =
             (self.antialias).prepare(&self.device, settings, output, targets, goes_on)?;
         let post = PostView {
             counters: counting.address,
+            time_sums: timing.sums,
             bloom: self
                 .bloom
                 .prepare(&self.device, output, settings.rt_bloom)?,
             bloom_strength: settings.rt_bloom,
             debug: settings.rt_debug as u32,
             image_rays: counting.image,
+            image_time: timing.image,
+            time_turn: timing.turn,
             padding: 0,
         };
         let prepared = Prepared {
@@ -392,6 +399,7 @@ impl ViewTracer {
             map_fog: params.scene.fog_count > 0,
             bounces: settings.rt_bounces > 0,
             gloss: targets.specular.is_some(),
+            timed: self.pixel_times.are_shown(),
         }
     }
 

@@ -90,6 +90,11 @@ pub const DEBUG_VARIANCE: u32 = 8;
 pub const DEBUG_GRADIENTS: u32 = 9;
 pub const DEBUG_RAYS: u32 = 10;
 pub const DEBUG_SPECULAR: u32 = 11;
+pub const DEBUG_TIME: u32 = 12;
+pub const DEBUG_RAY_TIME: u32 = 13;
+
+/// Frames that a view of time averages: a frame has the weight 1 / `TIMED_FRAMES`.
+pub const TIMED_FRAMES: u32 = 10;
 
 /// Bins of the histogram of luminance.
 pub const EXPOSURE_BINS: u32 = 128;

@@ -149,12 +149,18 @@ pub struct PostView {
     pub counters: u64,
     /// Texels of the bloom; 0: no bloom.
     pub bloom: u64,
+    /// Two pairs of a sum over pixels (logarithms of their ticks) and the number of pixels; 0: no view of time.
+    pub time_sums: u64,
     /// Part of the light that bloom spreads.
     pub bloom_strength: f32,
     /// `DEBUG_*`; 0: the picture.
     pub debug: u32,
     /// R32UI: rays of each pixel, or `NO_IMAGE`.
     pub image_rays: u32,
+    /// R32UI: clock ticks of each pixel times `TIMED_FRAMES`, or `NO_IMAGE`.
+    pub image_time: u32,
+    /// Which pair of `time_sums` this frame writes: 0 or 1; it reads the other.
+    pub time_turn: u32,
     /// To a multiple of eight bytes.
     pub padding: u32,
 }

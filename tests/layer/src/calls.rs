@@ -173,6 +173,7 @@ pub const EXTENSIONS: &[&str] = &[
     "VK_KHR_present_wait",
     "VK_KHR_ray_query",
     "VK_KHR_ray_tracing_pipeline",
+    "VK_KHR_shader_clock",
     "VK_KHR_surface",
     "VK_KHR_swapchain",
     "VK_KHR_wayland_surface",

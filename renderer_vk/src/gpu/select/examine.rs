@@ -89,6 +89,8 @@ struct Extensions {
     query: bool,
     /// Both extensions of dynamic blending, culling and depth tests.
     dynamic_state: bool,
+    /// The clock in shaders.
+    shader_clock: bool,
     /// Numbers of presentations, and waiting for one, where there is a window.
     present_wait: bool,
 }
@@ -118,6 +120,7 @@ impl Extensions {
             query: acceleration && has(khr::ray_query::NAME),
             dynamic_state: has(ext::extended_dynamic_state::NAME)
                 && has(ext::extended_dynamic_state3::NAME),
+            shader_clock: has(khr::shader_clock::NAME),
             present_wait: instance.surface.is_some()
                 && has(khr::present_id::NAME)
                 && has(khr::present_wait::NAME),
@@ -141,6 +144,7 @@ struct Features {
     query: vk::PhysicalDeviceRayQueryFeaturesKHR<'static>,
     dynamic: vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT<'static>,
     dynamic3: vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT<'static>,
+    clock: vk::PhysicalDeviceShaderClockFeaturesKHR<'static>,
     present_id: vk::PhysicalDevicePresentIdFeaturesKHR<'static>,
     present_wait: vk::PhysicalDevicePresentWaitFeaturesKHR<'static>,
 }
@@ -165,6 +169,9 @@ impl Features {
             chain = chain
                 .push_next(&mut found.dynamic)
                 .push_next(&mut found.dynamic3);
+        }
+        if extensions.shader_clock {
+            chain = chain.push_next(&mut found.clock);
         }
         if extensions.present_wait {
             chain = chain
@@ -257,6 +264,7 @@ impl Features {
             dynamic_state: is_on(self.dynamic.extended_dynamic_state)
                 && is_on(self.dynamic3.extended_dynamic_state3_color_blend_enable)
                 && is_on(self.dynamic3.extended_dynamic_state3_color_blend_equation),
+            shader_clock: is_on(self.clock.shader_subgroup_clock),
         }
     }
 }
@@ -417,6 +425,7 @@ fn info(
         ray_tracing: abilities.pipeline.then(|| limits.ray_tracing()),
         ray_query: abilities.query,
         timestamps: queue.timestamp_bits > 0 && properties.limits.timestamp_period > 0.0,
+        shader_clock: abilities.shader_clock,
         anisotropy: abilities
             .anisotropy
             .then_some(properties.limits.max_sampler_anisotropy),

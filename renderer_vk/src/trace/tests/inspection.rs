@@ -14,6 +14,7 @@ gpu_tests! {
     ],
     compute: [
         debug_views_show_what_they_say,
+        views_of_time_separate_pixels_with_many_rays_from_those_with_few,
     ],
 }
 
@@ -172,4 +173,48 @@ fn debug_views_show_what_they_say(gpu: &mut Gpu) {
     let rays = view(DebugOutput::Rays);
     // two rays: an eighth of log2(3) of the scale, a fifth of the way from blue to cyan
     assert!(near(rays, [21, 67, 230]), "{rays:?}");
+}
+
+fn views_of_time_separate_pixels_with_many_rays_from_those_with_few(gpu: &mut Gpu) {
+    let mut scene = Scene::new(Vec3::new(0.0, 0.0, 100.0), Vec3::ZERO, 20.0, SIZE as i32);
+    let grey = scene.diffuse(0.25);
+    let corner = Vec3::new(-500.0, 0.0, 0.0);
+    // half of the picture; 32 lights have a ray each
+    scene.quad(rectangle(corner, Vec3::X * 1000.0, Vec3::Y * 500.0), grey);
+    for i in 0..32 {
+        let start = Vec3::new(5.0 * i as f32 - 80.0, 0.0, 60.0);
+        scene.light(
+            [start, start + Vec3::Y * 4.0, start + Vec3::X * 4.0],
+            Vec3::ONE,
+        );
+    }
+    for rt_debug in [DebugOutput::Time, DebugOutput::RayTime] {
+        let settings = Settings {
+            rt_debug,
+            rt_num_random_dl: 0,
+            ..reference()
+        };
+        let (light, _) = gpu.render(&scene, &reference(), 1);
+        let (_, picture) = gpu.render(&scene, &settings, 12);
+        let side = |lit: bool| {
+            let pixels = light
+                .iter()
+                .zip(&picture)
+                .filter(|(light, _)| (light[0] > 0.0) == lit);
+            let (mut long, mut all) = (0, 0);
+            for (_, color) in pixels {
+                all += 1;
+                // the half of the scale above the mean has more red than blue
+                long += usize::from(color[0] > color[2]);
+            }
+            (long, all)
+        };
+        let ((lit_long, lit), (dark_long, dark)) = (side(true), side(false));
+        assert!(lit > 300 && dark > 300, "{lit} lit, {dark} dark pixels");
+        let name = format!("{rt_debug:?}: {lit_long} of {lit}, {dark_long} of {dark}");
+        assert!(
+            lit_long * 10 > lit * 8 && dark_long * 10 < dark * 2,
+            "{name}"
+        );
+    }
 }
