@@ -30,6 +30,7 @@ mod report;
 mod sample;
 mod scripts;
 mod settings;
+mod sharing;
 mod surfaces;
 mod table;
 mod timings;

@@ -1,21 +1,24 @@
 //! `relight render`: pictures of a map, without engine and display.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::SyncSender;
 
 use crate::chosen::{ChosenCamera, ChosenMap};
 use crate::denoise::DenoiseArgs;
 use crate::numbers;
 use crate::pictures::{check_name, write_rgb, write_whole};
 use crate::settings::{Assignment, SettingArgs, default, help, value_of};
+use crate::sharing::{self, Others, PartMean};
 use crate::timings::Timings;
 use crate::view::{Camera, draw, load};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use glam::Vec3;
 use indicatif::{ProgressBar, ProgressStyle};
-use renderer_vk::api::RefDef;
+use renderer_vk::api::{RefDef, RefEntity};
 use renderer_vk::path::{self, PathPoint};
-use renderer_vk::{LightSelection, Renderer, RendererOptions, Settings};
+use renderer_vk::{DebugOutput, FrameStats, LightSelection, Renderer, RendererOptions, Settings};
 
 /// Look of the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -96,6 +99,10 @@ pub struct RenderArgs {
     /// Vulkan device: part of its name
     #[arg(long, value_name = "NAME")]
     device: Option<String>,
+    /// Draw each picture by several devices, which share its --spp frames: part of a device's name, or its number, for
+    /// each
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', conflicts_with_all = ["device", "no_accumulation", "timings", "frame_times", "stats", "turn"])]
+    devices: Vec<String>,
     /// Enable Vulkan's validation layer; any message is an error
     #[arg(long)]
     validate: bool,
@@ -184,7 +191,51 @@ struct Shot {
     written: Option<PathBuf>,
 }
 
+impl Shot {
+    /// The view and the file of the picture that ends with this frame.
+    fn written(&self) -> Option<(&RefDef, &Path)> {
+        Some((&self.def, self.written.as_deref()?))
+    }
+}
+
 impl RenderArgs {
+    /// A renderer on a device.
+    fn renderer(&self, device: Option<&String>) -> anyhow::Result<Renderer> {
+        let (width, height) = self.size;
+        Renderer::new(RendererOptions {
+            validation: self.validate,
+            device: device.cloned(),
+            ..RendererOptions::headless(width, height)
+        })
+        .context("no picture without a Vulkan device")
+    }
+
+    /// An error where several devices cannot share the frames of a picture.
+    fn check_devices(&self, settings: &Settings) -> anyhow::Result<()> {
+        if self.devices.len() < 2 {
+            return Ok(());
+        }
+        if !settings.rt || !settings.rt_accumulate || settings.rt_debug != DebugOutput::None {
+            bail!(
+                "--devices share the mean picture of the traced look: it needs rt_accumulate 1 and rt_debug 0"
+            );
+        }
+        if settings.rt_scale < 1.0 {
+            bail!("--devices share pictures of the traced size: they need --render-scale 1");
+        }
+        if self.shutter == 0.0
+            && (self.step.is_some() || self.path.is_some() && self.frames.is_none())
+        {
+            bail!(
+                "--devices share the frames of one view: a --step needs a --shutter, and a --path needs --frames"
+            );
+        }
+        if (self.samples() as usize) < self.devices.len() {
+            bail!("--devices share --spp frames: there are more devices than frames");
+        }
+        Ok(())
+    }
+
     fn look(&self) -> Look {
         let usual = match self.overview {
             true => Look::Classic,
@@ -367,15 +418,12 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         bail!("--shutter is for the traced look; the classic one draws a single frame");
     }
     let settings = args.settings();
+    args.check_devices(&settings)?;
     let denoiser = args.denoise.filter(&settings)?;
     let (files, map) = args.chosen.open()?;
     let (width, height) = args.size;
-    let mut renderer = Renderer::new(RendererOptions {
-        validation: args.validate,
-        device: args.device.clone(),
-        ..RendererOptions::headless(width, height)
-    })
-    .context("no picture without a Vulkan device")?;
+    let device = args.devices.first().or(args.device.as_ref());
+    let mut renderer = args.renderer(device)?;
     let info = renderer.device_info().clone();
     let (_, entities) = load(&mut renderer, files, &map, &settings)?;
     let camera = match args.path {
@@ -393,15 +441,46 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     renderer.count_rays(args.stats);
     // standard output has the JSON only
     let json = args.stats || args.timings;
-    for shot in &shots {
-        let Shot { def, written, .. } = shot;
-        let stats = draw(&mut renderer, &entities, def)?;
-        if shot.joined_by > 0 {
-            renderer.join_frames(shot.joined_by);
+    let pictures: Vec<&[Shot]> = shots.split_inclusive(|s| s.written.is_some()).collect();
+    let count = args.devices.len().max(1);
+    let draw_parts = |name: &str, index: usize, means: &SyncSender<anyhow::Result<PartMean>>| {
+        let mut renderer = args.renderer(Some(&name.to_owned()))?;
+        let (files, map) = args.chosen.open()?;
+        let (_, entities) = load(&mut renderer, files, &map, &settings)?;
+        for picture in &pictures {
+            let part = sharing::part(picture.len(), index, count);
+            renderer.set_settings(&sharing::of_part(&settings, &part));
+            draw_part(&mut renderer, &entities, picture, &part, |_, _| bar.inc(1))?;
+            let (mean, frames) = (renderer.read_radiance()?, part.len());
+            // the other end is gone where the first device has failed
+            if means.send(Ok(PartMean { mean, frames })).is_err() {
+                break;
+            }
         }
-        timings.add(&renderer, &stats);
-        if let Some(path) = written {
+        check_messages(&renderer)
+    };
+    std::thread::scope(|scope| {
+        let others = Others::start(scope, &args.devices, &draw_parts);
+        for picture in &pictures {
+            let part = sharing::part(picture.len(), 0, count);
+            draw_part(
+                &mut renderer,
+                &entities,
+                picture,
+                &part,
+                |renderer, stats| {
+                    timings.add(renderer, stats);
+                    bar.inc(1);
+                },
+            )?;
+            let Some((def, path)) = picture.last().and_then(Shot::written) else {
+                continue;
+            };
             timings.finish(&mut renderer)?;
+            if count > 1 {
+                others.join(&mut renderer, part.len())?;
+                draw(&mut renderer, &entities, def)?;
+            }
             if let Some(denoiser) = &denoiser {
                 denoiser.apply(&mut renderer, &settings, |renderer| {
                     draw(renderer, &entities, def).map(drop)
@@ -415,8 +494,8 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
                 bar.suspend(|| println!("{}", path.display()));
             }
         }
-        bar.inc(1);
-    }
+        anyhow::Ok(())
+    })?;
     bar.finish_and_clear();
     if let Some(path) = &args.frame_times {
         write_whole(path, timings.csv().as_bytes())?;
@@ -440,6 +519,31 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         }
         println!("{}", serde_json::Value::Object(report));
     }
+    check_messages(&renderer)
+}
+
+/// Draws a part of a picture's frames; `drawn` is called after each.
+fn draw_part(
+    renderer: &mut Renderer,
+    entities: &[RefEntity],
+    picture: &[Shot],
+    part: &Range<usize>,
+    mut drawn: impl FnMut(&Renderer, &FrameStats),
+) -> anyhow::Result<()> {
+    let joins = picture.first().is_some_and(|shot| shot.joined_by > 0);
+    let shots = picture.get(part.clone()).unwrap_or_default();
+    for (number, shot) in shots.iter().enumerate() {
+        let stats = draw(renderer, entities, &shot.def)?;
+        if joins && number == 0 {
+            renderer.join_frames(u32::try_from(shots.len() - 1)?);
+        }
+        drawn(renderer, &stats);
+    }
+    Ok(())
+}
+
+/// An error if the validation layer has found something.
+fn check_messages(renderer: &Renderer) -> anyhow::Result<()> {
     let messages = renderer.validation_messages();
     if let Some(first) = messages.first() {
         bail!(

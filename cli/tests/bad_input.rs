@@ -237,3 +237,22 @@ fn a_missing_denoiser_is_reported_with_the_remedy() {
     wrong(&["--debug", "1"], "rt_debug 0");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
+
+#[test]
+fn devices_that_cannot_share_a_picture_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for (more, part) in [
+        (&["--look", "classic"][..], "traced look"),
+        (&["--render-scale", "0.5"], "--render-scale 1"),
+        (&["--debug", "1"], "rt_debug 0"),
+        (&["--step", "4,0,0,0"], "a --step needs a --shutter"),
+        (&["--spp", "1"], "more devices than frames"),
+    ] {
+        let usual = ["render", "--sample", "-o", "out.png", "--devices", "0,0"];
+        let output = relight(folder.path(), &[&usual, more].concat());
+        assert_eq!(output.status.code(), Some(1), "{more:?}: {output:?}");
+        let text = String::from_utf8(output.stderr).unwrap();
+        assert!(text.contains(part), "{text}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}

@@ -240,3 +240,43 @@ fn light_samples_denoisers_and_antialiasing_are_a_matrix() {
         (&"1".into(), &"all".into())
     );
 }
+
+#[test]
+fn devices_share_a_picture_without_changing_it() {
+    if !has_device() {
+        return;
+    }
+    let folder = room();
+    let draw = |devices: &str, name: &str| {
+        run(
+            env!("CARGO_BIN_EXE_relight"),
+            folder.path(),
+            &[
+                "render",
+                "room.bsp",
+                "--game",
+                ".",
+                "--size",
+                "48x32",
+                "--spp",
+                "6",
+                "-o",
+                name,
+                "--devices",
+                devices,
+            ],
+        );
+        image::open(folder.path().join(name)).unwrap().to_rgb8()
+    };
+    let alone = draw("0", "alone.png");
+    // two and four frames in one, three parts
+    for (devices, name) in [("0,0", "two.png"), ("0,0,0,0", "four.png")] {
+        let shared = draw(devices, name);
+        let most = alone
+            .iter()
+            .zip(shared.iter())
+            .map(|(a, b)| a.abs_diff(*b))
+            .max();
+        assert!(most <= Some(1), "{devices}: {most:?}");
+    }
+}

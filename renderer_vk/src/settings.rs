@@ -200,6 +200,9 @@ settings! { variables {
 } others {
     /// Temporal gradients of A-SVGF. Measurements compare with them off.
     rt_gradients: bool = true;
+    /// Number of the first accumulated frame: its random numbers are those of this frame of a longer mean, so that several
+    /// devices can share it.
+    rt_first_frame: u32 = 0;
     /// Whether the window filled the screen when it was opened (`r_fullscreen`).
     fullscreen: bool = false;
     /// `r_ignorehwgamma` when the window was opened: gamma is applied to textures instead of to the finished picture.

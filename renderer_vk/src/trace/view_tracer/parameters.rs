@@ -86,7 +86,7 @@ impl ViewTracer {
             height: targets.height,
             flags: self.flags(settings, targets, accel.first_person),
             seed: if settings.rt_accumulate {
-                accumulated
+                accumulated.wrapping_add(settings.rt_first_frame)
             } else {
                 self.frame
             },
