@@ -34,6 +34,8 @@ pub use view::{CameraView, ExposureView, ImageView, PostView, SceneView, TargetV
 pub struct TraceView {
     /// 16 bytes a pixel that passes use in turns: primary hits, then sampled lights, then light being filtered.
     pub scratch: u64,
+    /// Blue noise, `BLUE_NOISE_SIZE` squared floats from 0 to 1; 0: not in use.
+    pub blue_noise: u64,
     /// Materials of all geometry that rays hit.
     pub materials: MaterialBuffers,
     /// Geometry, portals, skies, fog volumes.

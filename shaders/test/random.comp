@@ -1,6 +1,7 @@
 #version 460
 // Test of the random numbers: what `count` frames from `first` on draw at each of some pixels.
 #include "common/bindless.glsl"
+#define RANDOM_WITHOUT_VIEW
 #include "trace/random.glsl"
 
 layout(local_size_x = 64) in;

@@ -9,6 +9,18 @@
 // Hash Functions for GPU Rendering, JCGT 9(3), 2020).
 #ifndef RELIGHT_TRACE_RANDOM_GLSL
 #define RELIGHT_TRACE_RANDOM_GLSL
+#ifndef RANDOM_WITHOUT_VIEW
+#include "trace/view.glsl"
+
+// 1: the pixels share their sequences, each rotated by the pixel's blue noise, so that noise has no low frequencies
+// over the picture (Georgiev and Fajardo, Blue-noise Dithered Sampling, SIGGRAPH 2016 Talks; in Deferred Hybrid Path
+// Tracing, Ray Tracing Gems, 2019, section 26.4.1).
+layout(constant_id = 6) const uint BLUE_NOISE = 0;
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer BlueNoiseTexels { float at[]; };
+#else
+const uint BLUE_NOISE = 0;
+#endif
 
 uint pcg_permute(uint state) {
     uint word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
@@ -21,10 +33,14 @@ uint pcg_hash(uint x) { return pcg_permute(pcg_step(x)); }
 
 uint rng_state; // of pixel and pass; one step for each sequence
 uint rng_index; // frame index with reversed bits
+uvec2 rng_pixel; // with blue noise
 
 // `stream`: STREAM_*.
 void rng_begin(uvec2 pixel, uint frame, uint stream) {
-    rng_state = pcg_hash(pixel.x + pcg_hash(pixel.y + pcg_hash(stream)));
+    if (BLUE_NOISE != 0) {
+        rng_pixel = pixel;
+        rng_state = pcg_hash(pcg_hash(stream));
+    } else rng_state = pcg_hash(pixel.x + pcg_hash(pixel.y + pcg_hash(stream)));
     rng_index = bitfieldReverse(frame);
 }
 
@@ -57,21 +73,39 @@ uint sobol_second(uint index) {
 // Uniform in [0, 1): 24 bits, so that 1 never occurs.
 float unit_float(uint bits) { return float(bits >> 8u) * (1.0 / 16777216.0); }
 
+// A number of a sequence, as the pixel gets it; `seed`: of the dimension, which has a place of its own in the square.
+float rotated(float x, uint seed) {
+#ifndef RANDOM_WITHOUT_VIEW
+    if (BLUE_NOISE != 0) {
+        uvec2 place = (rng_pixel + uvec2(seed, seed >> 16u)) % BLUE_NOISE_SIZE;
+        x = fract(x + BlueNoiseTexels(VIEW.blue_noise).at[place.y * BLUE_NOISE_SIZE + place.x]);
+    }
+#endif
+    return x;
+}
+
 // The next number of one dimension: the first Sobol dimension is the index with reversed bits.
 float rng_next() {
     uint index = bitfieldReverse(scramble(rng_index, rng_seed()));
-    return unit_float(bitfieldReverse(scramble(index, rng_seed())));
+    uint seed = rng_seed();
+    return rotated(unit_float(bitfieldReverse(scramble(index, seed))), seed);
 }
 
 // The next numbers of two dimensions.
 vec2 rng_next2() {
     uint index = bitfieldReverse(scramble(rng_index, rng_seed()));
-    float x = unit_float(bitfieldReverse(scramble(index, rng_seed())));
-    return vec2(x, unit_float(bitfieldReverse(scramble(sobol_second(index), rng_seed()))));
+    uint seed = rng_seed();
+    float x = rotated(unit_float(bitfieldReverse(scramble(index, seed))), seed);
+    seed = rng_seed();
+    return vec2(x, rotated(unit_float(bitfieldReverse(scramble(sobol_second(index), seed))), seed));
 }
 
 // A number that is independent between frames, for uses that gain nothing from a sequence; a third of the cost.
-float rng_independent() { return unit_float(pcg_hash(rng_seed() ^ rng_index)); }
+float rng_independent() {
+    uint seed = rng_seed() ^ rng_index;
+    if (BLUE_NOISE != 0) seed ^= pcg_hash(rng_pixel.x + pcg_hash(rng_pixel.y));
+    return unit_float(pcg_hash(seed));
+}
 
 // True with the probability `chance`. `u` decides and is uniform afterwards, so that one number makes several
 // decisions, and evenly spread numbers are spread evenly over all outcomes.

@@ -1,6 +1,7 @@
 //! General tools, independent of maps and rendering.
 //!
 //! * [`aabb`]: axis-aligned boxes.
+//! * [`blue_noise`]: numbers without low frequencies.
 //! * [`bvh`]: bounding volume hierarchies over boxes.
 //! * [`grid`]: uniform grids over triangles.
 //! * [`parallel`]: a function of every item, on all cores.
@@ -16,6 +17,7 @@
 )]
 
 pub mod aabb;
+pub mod blue_noise;
 pub mod bvh;
 pub mod grid;
 pub mod hash;

@@ -120,6 +120,7 @@ fn states(pass: Pass, settings: &Settings, needs: MapNeeds) -> Vec<usize> {
             Switch::Gloss => needs.has_gloss(settings),
             Switch::Caustics => needs.bodies && photons::in_use(settings),
             Switch::Timed => false,
+            Switch::BlueNoise => settings.rt_blue_noise,
         };
         if !on {
             continue;

@@ -32,6 +32,8 @@ pub struct FrameFacts {
     pub gloss: bool,
     /// The time of pixels is measured.
     pub timed: bool,
+    /// Random numbers of light are blue noise over the picture.
+    pub blue_noise: bool,
 }
 
 impl FrameFacts {
@@ -43,6 +45,7 @@ impl FrameFacts {
             Switch::Gloss => self.gloss,
             Switch::Caustics => self.photons > 0,
             Switch::Timed => self.timed,
+            Switch::BlueNoise => self.blue_noise,
         }
     }
 

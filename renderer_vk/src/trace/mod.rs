@@ -13,6 +13,7 @@ pub mod ahead;
 pub mod antialias;
 pub mod beyond_sky;
 pub mod bloom;
+mod blue_noise;
 mod bodies;
 pub mod bvh;
 mod cell_grid;

@@ -16,7 +16,7 @@ pub enum Pipeline {
 }
 
 /// Most switches of a pass.
-pub const SWITCHES: usize = 4;
+pub const SWITCHES: usize = 5;
 
 /// Pipelines of each pass, by the state of its switches: one bit each.
 pub struct PassSet {

@@ -59,6 +59,8 @@ pub enum Switch {
     Caustics,
     /// A view of `rt_debug` shows the time of pixels.
     Timed,
+    /// The random numbers of light are blue noise over the picture.
+    BlueNoise,
 }
 
 /// Data that passes exchange within a frame.
@@ -221,7 +223,7 @@ macro_rules! passes {
         /// Declarations, in the order of [`Pass`].
         pub static TABLE: &[Row] = {
             #[allow(clippy::enum_glob_use)] // rows name many of them
-            use {Resource::*, Shader::{Compute, Rays}, Switch::{Bounces, Caustics, Gloss, LitFog, MapFog, Timed}};
+            use {Resource::*, Shader::{Compute, Rays}, Switch::{BlueNoise, Bounces, Caustics, Gloss, LitFog, MapFog, Timed}};
             &[$(Row { $($field: $value,)* ..Row::of(concat!($($about),+), $name, $shader, Size::$size) }),+]
         };
     };
@@ -280,7 +282,7 @@ passes! {
     }
     /// Samples one light for each pixel, and sorts the rays of a tile by direction.
     SampleLights = "trace_sample_lights", Compute(&shaders::TRACE_SAMPLE_LIGHTS_COMP), Traced {
-        switches: &[(ids::clock::TIMED, Timed)],
+        switches: &[(ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
         reads: &[Lights, GBuffer, Positions, Normals],
         may_read: &[GradientPixels],
         writes: &[SampledLights],
@@ -288,7 +290,7 @@ passes! {
     /// Shadow rays to the sampled lights.
     SampledDirect = "trace_direct", Rays(&shaders::TRACE_DIRECT), RayTiles {
         constants: &[(ids::direct::SAMPLING, t::SAMPLING_LIGHT)],
-        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed)],
+        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, SampledLights],
         may_read: &[GradientPixels, PhotonCells],
         writes: &[DirectLight],
@@ -297,7 +299,7 @@ passes! {
     /// Shadow rays to suns, whose light is added.
     Suns = "trace_suns", Rays(&shaders::TRACE_DIRECT), RayTiles {
         constants: &[(ids::direct::SAMPLING, t::SAMPLING_SUNS)],
-        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed)],
+        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, SampledLights, DirectLight],
         may_read: &[GradientPixels, PhotonCells],
         writes: &[DirectLight],
@@ -305,7 +307,7 @@ passes! {
     }
     /// Direct light where a pixel samples several lights or all.
     Direct = "trace_direct", Rays(&shaders::TRACE_DIRECT), Traced {
-        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed)],
+        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals],
         may_read: &[GradientPixels, PhotonCells],
         writes: &[DirectLight],
@@ -313,7 +315,7 @@ passes! {
     }
     /// Light that flat mirrors of the map reflect onto the surfaces from which a bounce starts.
     MirrorLight = "trace_mirror_light", Rays(&shaders::TRACE_MIRROR_LIGHT), Cells {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals],
         may_read: &[GradientPixels, BounceLights],
         writes: &[BounceLights],
@@ -321,7 +323,7 @@ passes! {
     }
     /// Rays of a bounce.
     BounceRays = "trace_bounce_rays", Rays(&shaders::TRACE_BOUNCE_RAYS), Cells {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
         reads: &[Scene, GBuffer, Positions, Normals],
         may_read: &[GradientPixels, BounceLights, GlossSurfaces],
         writes: &[BounceHits],
@@ -329,7 +331,7 @@ passes! {
     }
     /// Shades what they hit, and samples a light for it.
     BounceShade = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
-        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed)],
+        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
         may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells],
         writes: &[BounceLights, GlossSurfaces],
@@ -337,14 +339,14 @@ passes! {
     /// The same of the last bounce, after which no path goes on.
     BounceShadeLast = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
         constants: &[(ids::bounce::LAST_BOUNCE, 1)],
-        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed)],
+        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
         may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells],
         writes: &[BounceLights, GlossSurfaces],
     }
     /// Shadow rays to those lights; the last writes the light of the paths, of one of both kinds.
     BounceLight = "trace_bounce_light", Rays(&shaders::TRACE_BOUNCE_LIGHT), Cells {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceLights],
         may_read: &[GradientPixels, GlossSurfaces],
         writes: &[IndirectLight, GlossLight],
@@ -353,7 +355,7 @@ passes! {
     /// Specular light of sampled lights at rough surfaces. The passes of a bounce then trace its other paths.
     SpecularLight = "trace_specular_light", Rays(&shaders::TRACE_SPECULAR_LIGHT), Cells {
         constants: &[(ids::specular::HAS_GLOSS, 1)],
-        switches: &[(ids::clock::TIMED, Timed)],
+        switches: &[(ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, GlossSurfaces],
         writes: &[BounceLights],
         counter: Some(t::COUNT_SPECULAR),

@@ -11,6 +11,7 @@ use shaders::trace_types::{CameraView, PortalRecord, PostView, TraceView};
 use super::accel::Accel;
 use super::antialias::{self, Antialias, traced_size};
 use super::bloom::Bloom;
+use super::blue_noise::BlueNoise;
 use super::counters::RayCounters;
 use super::denoise::{self, Denoiser};
 use super::fog::LitFog;
@@ -73,6 +74,7 @@ pub struct ViewTracer {
     antialias: Antialias,
     motion: Motion,
     bloom: Bloom,
+    blue_noise: BlueNoise,
     pub(super) photons: Photons,
     counters: RayCounters,
     pixel_times: PixelTimes,
@@ -124,6 +126,7 @@ impl ViewTracer {
             antialias: Antialias::new(device)?,
             motion: Motion::default(),
             bloom: Bloom::default(),
+            blue_noise: BlueNoise::default(),
             photons: Photons::default(),
             counters: RayCounters::default(),
             pixel_times: PixelTimes::default(),
@@ -246,6 +249,9 @@ impl ViewTracer {
         targets.fit(&self.device, own_images(settings, output, has_gloss))?;
         if has_gloss {
             self.specular_table.make(&self.device)?;
+        }
+        if settings.rt_blue_noise {
+            self.blue_noise.make(&self.device)?;
         }
         let params = self.prepare(targets, rec, view, output)?;
         targets.indirect_is_black &= settings.rt_bounces == 0;
@@ -400,6 +406,7 @@ impl ViewTracer {
             bounces: settings.rt_bounces > 0,
             gloss: targets.specular.is_some(),
             timed: self.pixel_times.are_shown(),
+            blue_noise: settings.rt_blue_noise,
         }
     }
 

@@ -96,6 +96,9 @@ pub const DEBUG_RAY_TIME: u32 = 13;
 /// Frames that a view of time averages: a frame has the weight 1 / `TIMED_FRAMES`.
 pub const TIMED_FRAMES: u32 = 10;
 
+/// Width and height of the square of blue noise, texels.
+pub const BLUE_NOISE_SIZE: u32 = 64;
+
 /// Bins of the histogram of luminance.
 pub const EXPOSURE_BINS: u32 = 128;
 

@@ -21,6 +21,7 @@ gpu_tests! {
         bounced_light_of_listed_lights_is_counted_once,
         a_point_is_lit_by_the_list_of_its_cluster,
         points_pulse_with_their_style,
+        blue_noise_keeps_the_mean_and_lacks_low_frequencies,
     ],
     each: [
         an_umbra_is_black_and_a_penumbra_is_between,
@@ -455,4 +456,49 @@ fn facets_of_a_ball_do_not_shadow_it(gpu: &mut Gpu) {
     };
     assert!(dark_pixels(gpu, false) > 20, "the facets show without it");
     assert_eq!(dark_pixels(gpu, true), 0);
+}
+
+/// Variance of the pixels' relative errors, and of their means over blocks of 4 x 4 pixels.
+fn error_variances(picture: &[Vec3], mean: &[Vec3], size: usize) -> [f32; 2] {
+    let error = |i: usize| picture[i].x / mean[i].x - 1.0;
+    let variance = |errors: &[f32]| errors.iter().map(|e| e * e).sum::<f32>() / errors.len() as f32;
+    let pixels: Vec<f32> = (0..size * size).map(error).collect();
+    let block = |block: usize| {
+        let corner = block / (size / 4) * 4 * size + block % (size / 4) * 4;
+        (0..16)
+            .map(|i| pixels[corner + i / 4 * size + i % 4])
+            .sum::<f32>()
+            / 16.0
+    };
+    let blocks: Vec<f32> = (0..size * size / 16).map(block).collect();
+    [variance(&pixels), variance(&blocks)]
+}
+
+fn blue_noise_keeps_the_mean_and_lacks_low_frequencies(gpu: &mut Gpu) {
+    const SIZE: usize = 64;
+    let mut scene = Scene::new(Vec3::new(-100.0, 0.0, 80.0), Vec3::ZERO, 20.0, SIZE as i32);
+    let white = scene.diffuse(1.0);
+    scene.quad(floor_at(0.0, 500.0), white);
+    // a penumbra over the whole picture
+    scene.quad(ceiling_at(120.0, 30.0), white);
+    scene.lamp(Vec3::new(-100.0, -100.0, 240.0), 200.0, Vec3::ONE);
+    let mut drawn = |rt_blue_noise, frames| {
+        let settings = Settings {
+            rt_blue_noise,
+            ..reference()
+        };
+        gpu.render(&scene, &settings, frames).0
+    };
+    let [mean, blue_mean] = [false, true].map(|blue| drawn(blue, 256));
+    let total = |picture: &[Vec3]| picture.iter().map(|p| p.x).sum::<f32>();
+    let ratio = total(&blue_mean) / total(&mean);
+    assert!((ratio - 1.0).abs() < 0.003, "{ratio}");
+    let of = |blue| error_variances(&drawn(blue, 1), &mean, SIZE);
+    let [[pixels, blocks], [blue_pixels, blue_blocks]] = [false, true].map(of);
+    // the same noise in a pixel, less of it in blocks: both coordinates are blue noise, their pairs are not
+    assert!(
+        (0.7..1.4).contains(&(blue_pixels / pixels)),
+        "{blue_pixels} and {pixels}"
+    );
+    assert!(blue_blocks < 0.75 * blocks, "{blue_blocks} and {blocks}");
 }

@@ -58,6 +58,7 @@ impl ViewTracer {
         let flares = traced.map.map_or_else(FlareTest::default, |m| m.flares);
         Ok(TraceView {
             scratch: targets.scratch.address(),
+            blue_noise: self.blue_noise.address(),
             materials: traced.materials.buffers(),
             scene: scene_view(rec, traced, prepared)?,
             lights: lights.of_view(rec, scene, settings)?,
