@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, ensure};
 use clap::{Args, ValueEnum};
 use oidn::{Guides, Oidn};
-use renderer_vk::{DebugOutput, Renderer, Settings};
+use renderer_vk::{DebugOutput, Look, Renderer, Settings};
 
 use crate::surfaces::{Mean, Texel, albedo, normal};
 
@@ -42,7 +42,10 @@ impl DenoiseArgs {
         if self.denoise.is_none() {
             return Ok(None);
         }
-        ensure!(settings.rt, "--denoise is for the traced look");
+        ensure!(
+            settings.rt == Look::Traced,
+            "--denoise is for the traced look"
+        );
         ensure!(
             settings.rt_accumulate && settings.rt_debug == DebugOutput::None,
             "--denoise filters the mean picture: it needs rt_accumulate 1 and rt_debug 0"

@@ -27,6 +27,8 @@ pub enum Look {
     Classic,
     /// Ray traced.
     Traced,
+    /// The classic look with traced shadows and reflections.
+    Hybrid,
 }
 
 /// Light sampling of the traced look.
@@ -246,7 +248,11 @@ impl RenderArgs {
 
     fn settings(&self) -> Settings {
         let mut settings = Settings {
-            rt: self.look() == Look::Traced,
+            rt: match self.look() {
+                Look::Classic => renderer_vk::Look::Classic,
+                Look::Traced => renderer_vk::Look::Traced,
+                Look::Hybrid => renderer_vk::Look::Hybrid,
+            },
             rt_accumulate: !self.no_accumulation,
             rt_taa: !self.no_taa,
             rt_dof: self.lens.is_some(),
@@ -282,7 +288,7 @@ impl RenderArgs {
             let camera = Camera::overview(world, self.size, self.fov)
                 .context("the map has no triangles to draw")?;
             return Ok(match self.look() {
-                Look::Classic => camera,
+                Look::Classic | Look::Hybrid => camera,
                 // from outside, rays hit the back of the sky instead of the map
                 Look::Traced => camera.moved_inside(bsp),
             });
@@ -301,8 +307,8 @@ impl RenderArgs {
     fn samples(&self) -> u32 {
         match self.look() {
             Look::Traced => self.spp.unwrap_or(64),
-            Look::Classic if self.measures() => self.spp.unwrap_or(64),
-            Look::Classic => 1,
+            Look::Classic | Look::Hybrid if self.measures() => self.spp.unwrap_or(64),
+            Look::Classic | Look::Hybrid => 1,
         }
     }
 
@@ -414,8 +420,8 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     if args.shutter > 0.0 && args.frames.is_none() && args.step.is_none() {
         bail!("--shutter blurs what moves: give a --path with --frames, or a --step");
     }
-    if args.shutter > 0.0 && args.look() == Look::Classic {
-        bail!("--shutter is for the traced look; the classic one draws a single frame");
+    if args.shutter > 0.0 && args.look() != Look::Traced {
+        bail!("--shutter is for the traced look; the others draw a single frame");
     }
     let settings = args.settings();
     args.check_devices(&settings)?;

@@ -9,7 +9,7 @@ use clap::Args;
 use relight::GameFiles;
 use renderer_vk::api::{Picture, RefDef};
 use renderer_vk::report::Report;
-use renderer_vk::{Costs, Renderer, RendererOptions, Settings};
+use renderer_vk::{Costs, Look, Renderer, RendererOptions, Settings};
 
 use crate::game::Game;
 use crate::messages;
@@ -111,8 +111,8 @@ impl Drawn {
         let (bsp, entities) = load(&mut renderer, files, map, &settings)?;
         let camera = Camera::of_map(&bsp).context("the map has no place for a camera")?;
         let mut pictures = Vec::new();
-        for (name, traced) in [("classic", false), ("traced", true)] {
-            settings.rt = traced;
+        for look in [Look::Classic, Look::Traced] {
+            settings.rt = look;
             renderer.set_settings(&settings);
             for frame in 0..FRAMES {
                 let def = RefDef {
@@ -122,9 +122,9 @@ impl Drawn {
                 draw(&mut renderer, &entities, &def)?;
                 renderer.timings();
             }
-            pictures.push((name.to_owned(), renderer.read_pixels()?));
+            pictures.push((look.name().to_owned(), renderer.read_pixels()?));
         }
-        let changed = [("r_rt", settings.rt.into()), ("r_picmip", settings.picmip)];
+        let changed = [("r_rt", settings.rt as u32), ("r_picmip", settings.picmip)];
         Ok(Self {
             costs: renderer.costs(),
             settings: changed

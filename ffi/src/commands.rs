@@ -15,7 +15,7 @@ use crate::session::{self, Front, with_renderer};
 use crate::window;
 use crate::window::modes::MODES;
 use renderer_vk::Renderer;
-use renderer_vk::settings::Preset;
+use renderer_vk::settings::{Look, Preset};
 use std::ffi::CStr;
 use std::time::Instant;
 
@@ -235,7 +235,7 @@ unsafe extern "C" fn preset() {
 
 /// Begins `rt_preset auto`; the preset to begin with, and lines for the console.
 fn begin_trial(renderer: &Renderer, front: &mut Front) -> (Option<&'static Preset>, Vec<String>) {
-    if !front.settings.rt || renderer.world().is_none() {
+    if front.settings.rt != Look::Traced || renderer.world().is_none() {
         let line = "rt_preset auto measures the traced look: set r_rt 1 and start a map first";
         return (None, vec![line.into()]);
     }
@@ -372,7 +372,7 @@ unsafe extern "C" fn gfx_info() {
             format!("texturemode: {}", settings.texture_mode.name()),
             format!("picmip: {}", settings.picmip),
             format!("anisotropic filtering: {aids}"),
-            format!("look: {}", if settings.rt { "traced" } else { "classic" }),
+            format!("look: {}", settings.rt.name()),
         ]
     });
 }

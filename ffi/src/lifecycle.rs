@@ -14,7 +14,7 @@ use crate::presets::Step;
 use crate::session::{self, Front, with_renderer};
 use crate::show_panel;
 use crate::window::{self, Window};
-use renderer_vk::{Eye, Renderer, RendererOptions};
+use renderer_vk::{Eye, Look, Renderer, RendererOptions};
 use std::ffi::{CStr, c_int};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -362,7 +362,9 @@ pub unsafe extern "C" fn end_frame(front_end_ms: *mut c_int, back_end_ms: *mut c
             return Ok(());
         };
         // views held by rt_pause include the video pictures on their walls
-        let held = with_renderer(|_, front| Ok(front.settings.rt && front.settings.rt_pause))?;
+        let held = with_renderer(|_, front| {
+            Ok(front.settings.rt == Look::Traced && front.settings.rt_pause)
+        })?;
         if !held {
             run_videos(engine)?;
         }

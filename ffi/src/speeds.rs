@@ -1,6 +1,6 @@
 //! Output of `r_speeds`.
 
-use renderer_vk::{FrameStats, Renderer, Settings};
+use renderer_vk::{FrameStats, Look, Renderer, Settings};
 
 /// The lines of one frame: for 1 to 6 those of the engine's own renderer, in its order, with our counts; for the traced
 /// look, which has no such counts, the frame's time.
@@ -8,7 +8,7 @@ pub fn lines(settings: &Settings, stats: &FrameStats, renderer: &Renderer) -> Ve
     if settings.speeds == 0 || settings.skip_back_end {
         return Vec::new();
     }
-    if settings.rt {
+    if settings.rt == Look::Traced {
         let gpu: f32 = renderer.timings().iter().map(|(_, ms)| ms).sum();
         let mut line = format!(
             "{} views, {} draws; {gpu:.2} ms on the GPU in an earlier frame",

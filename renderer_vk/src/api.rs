@@ -4,6 +4,8 @@
 
 use glam::{Vec2, Vec3};
 
+pub use crate::settings::Look;
+
 /// Kind of a scene entity (`refEntityType_t`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum EntityKind {
@@ -131,15 +133,6 @@ pub struct StillPicture {
     pub picture: Picture,
     /// The linear picture before exposure, if it was requested; display white has radiance 1.
     pub radiance: Option<Vec<[f32; 3]>>,
-}
-
-/// A look of a view.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Look {
-    /// As the engine's own renderer draws it.
-    Classic,
-    /// Ray traced.
-    Traced,
 }
 
 impl Default for RefDef {

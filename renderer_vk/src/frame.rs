@@ -7,11 +7,12 @@ use shaders::types::Instance;
 use crate::assets::Assets;
 use crate::gpu::{self, ColorMask, Image, Recorder};
 use crate::raster::{
-    Aids, DrawList, FlareTest, Flares, Overlay, PixelLights, Raster, StageContext, Statics,
-    SurfaceMapping, Target, UiMeshes, ViewParameters, overlay_instance, window_to_clip,
+    Aids, DrawList, FlareTest, Flares, HybridSurfaces, Overlay, PixelLights, Raster, StageContext,
+    Statics, SurfaceMapping, Target, UiMeshes, ViewParameters, overlay_instance, window_to_clip,
 };
 use crate::scene::{ClassicScene, TracedScene, ViewScene};
 use crate::settings::Settings;
+use crate::trace::hybrid::{HybridLook, HybridScene};
 use crate::trace::{MapView, TraceLook};
 use crate::world::World;
 
@@ -25,6 +26,8 @@ pub enum Item {
     Ui(UiMeshes),
     /// A 3D view in the classic look: at most one portal view, then the view itself.
     Classic(Vec<ClassicScene>),
+    /// The same with traced shadows, and what their rays meet.
+    Hybrid(Vec<ClassicScene>, Box<TracedScene>),
     /// A 3D view in the traced look.
     Traced(Box<TracedScene>),
 }
@@ -51,6 +54,10 @@ pub struct FrameContext<'a> {
     pub flares: &'a mut Flares,
     /// The traced look, if the device traces rays.
     pub trace: Option<&'a mut TraceLook>,
+    /// The hybrid look, once it is in use.
+    pub hybrid: Option<&'a mut HybridLook>,
+    /// Draws the surfaces from which its rays start.
+    pub hybrid_surfaces: &'a mut HybridSurfaces,
     /// Draw list, reused.
     pub list: &'a mut DrawList,
 }
@@ -67,7 +74,18 @@ impl<'a> FrameContext<'a> {
             Item::Ui(meshes) => self.ui(recorder, meshes),
             Item::Classic(scenes) => scenes
                 .iter()
-                .try_for_each(|scene| self.classic(recorder, scene)),
+                .try_for_each(|scene| self.classic(recorder, scene, None)),
+            Item::Hybrid(scenes, met) => {
+                let traced = match (self.hybrid.as_deref_mut(), self.world) {
+                    (Some(look), Some(world)) => {
+                        Some(look.begin(recorder, met, world, self.assets)?)
+                    }
+                    _ => None,
+                };
+                scenes
+                    .iter()
+                    .try_for_each(|scene| self.classic(recorder, scene, traced))
+            }
             Item::Traced(scene) => self.traced(recorder, scene),
         }
     }
@@ -124,6 +142,7 @@ impl<'a> FrameContext<'a> {
                 .settings
                 .no_bind
                 .then(|| assets.textures.dynamic_light()),
+            traced_shadows: false,
         }
     }
 
@@ -197,11 +216,20 @@ impl<'a> FrameContext<'a> {
         }
     }
 
-    fn classic(&mut self, recorder: &mut Recorder, scene: &ClassicScene) -> Result<(), gpu::Error> {
+    /// Records a view of the classic look. `traced`: what rays of the hybrid look meet.
+    fn classic(
+        &mut self,
+        recorder: &mut Recorder,
+        scene: &ClassicScene,
+        traced: Option<HybridScene>,
+    ) -> Result<(), gpu::Error> {
         let settings = self.settings;
         let world = self.world.filter(|_| scene.has_world);
         self.list.clear();
-        let stages = self.stages();
+        let stages = StageContext {
+            traced_shadows: traced.is_some(),
+            ..self.stages()
+        };
         self.list.add_view(
             scene,
             stages,
@@ -241,8 +269,20 @@ impl<'a> FrameContext<'a> {
             shadows: Some((&scene.look.shadows, view)),
         };
         let target = self.target();
-        self.raster
-            .record(recorder, "classic", target, self.list, &parameters)?;
+        let mut uploaded = self.raster.upload(recorder, self.list, &parameters)?;
+        if let (Some(traced), Some(look)) = (traced, self.hybrid.as_deref_mut()) {
+            let images = look.images([self.drawn.width(), self.drawn.height()])?;
+            (self.hybrid_surfaces).record(recorder, images, self.list, &parameters, &uploaded)?;
+            uploaded.hybrid = look.trace(recorder, traced, scene, &parameters, self.assets)?;
+        }
+        self.raster.record_uploaded(
+            recorder,
+            "classic",
+            target,
+            self.list,
+            &parameters,
+            &uploaded,
+        )?;
         let test = self.flares.begin(recorder, scene)?;
         if test.count == 0 || !self.flares.test_depth(recorder, target, test)? {
             return Ok(());

@@ -38,8 +38,8 @@ pub use renderer::{
     CpuTimes, FRAMES_IN_FLIGHT, FrameStats, Renderer, RendererOptions, map_options, probe,
 };
 pub use settings::{
-    Anaglyph, DebugOutput, DenoiserChoice, HdrChoice, LightSelection, MapLightChoice, ModelShadows,
-    Settings, TextureMode, TracerChoice,
+    Anaglyph, DebugOutput, DenoiserChoice, HdrChoice, LightSelection, Look, MapLightChoice,
+    ModelShadows, Settings, TextureMode, TracerChoice,
 };
 pub use statistics::{Costs, Latency, MemoryPurpose, PassCost, Spread, StructureCost};
 pub use stereo::Eye;

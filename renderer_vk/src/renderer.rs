@@ -23,13 +23,14 @@ use crate::gpu::{
     SwapchainDesc, Window, give_back_freed_memory,
 };
 use crate::pacing::Pacer;
-use crate::raster::{DrawList, Flares, Overlay, Present, Raster, UiTextures};
+use crate::raster::{DrawList, Flares, HybridSurfaces, Overlay, Present, Raster, UiTextures};
 use crate::scene::{GatherInput, Scene};
 use crate::settings::{Anaglyph, HdrChoice, Settings};
 use crate::stereo::Eye;
 use crate::targets::FrameTargets;
 use crate::trace::TraceLook;
 use crate::trace::ahead::compile_ahead;
+use crate::trace::hybrid::HybridLook;
 use crate::trace::pass_set::PassSet;
 use crate::trace::tracer::Tracer;
 use crate::world::{EntityTokens, Marker, World, WorldOptions};
@@ -85,6 +86,9 @@ pub struct Renderer {
     // fields are dropped in this order: objects of the device before the device
     still: StillRequest,
     trace: Option<TraceLook>,
+    hybrid: Option<HybridLook>,
+    /// The hybrid look cannot be made, as the log states.
+    lacks_hybrid: bool,
     /// Pipelines of the traced look, made at its first use.
     trace_passes: Option<Arc<PassSet>>,
     world: Option<World>,
@@ -94,6 +98,7 @@ pub struct Renderer {
     assets: Option<Assets>,
     list: DrawList,
     raster: Raster,
+    hybrid_surfaces: HybridSurfaces,
     flares: Flares,
     ui: UiTextures,
     present: Option<Present>,
@@ -210,6 +215,8 @@ impl Renderer {
         Ok(Self {
             still: StillRequest::default(),
             trace: None,
+            hybrid: None,
+            lacks_hybrid: false,
             trace_passes: None,
             world: None,
             scene: Scene::default(),
@@ -217,6 +224,7 @@ impl Renderer {
             assets: None,
             list: DrawList::new(!device.info().software),
             raster: Raster::new(&device),
+            hybrid_surfaces: HybridSurfaces::new(&device),
             flares: Flares::new(&device),
             ui: UiTextures::default(),
             present,
@@ -326,8 +334,11 @@ impl Renderer {
     pub fn set_settings(&mut self, settings: &Settings) {
         if self.settings != *settings {
             self.settings.clone_from(settings);
-            if !(settings.rt && settings.rt_pause) {
+            if !(settings.rt == Look::Traced && settings.rt_pause) {
                 self.held.release();
+            }
+            if let Some(hybrid) = self.hybrid.as_mut().filter(|_| settings.rt != Look::Hybrid) {
+                hybrid.drop_images();
             }
             if let Some(assets) = &mut self.assets {
                 assets.set_settings(settings);
@@ -378,11 +389,9 @@ impl Renderer {
             self.scene.clear();
             return Ok(());
         }
-        let wants_traced = match def.look {
-            Some(look) => look == Look::Traced,
-            None => self.settings.rt,
-        };
-        let traced = wants_traced && wants_world && self.ready_to_trace()?;
+        let look = def.look.unwrap_or(self.settings.rt);
+        let traced = look == Look::Traced && wants_world && self.ready_to_trace()?;
+        let hybrid = look == Look::Hybrid && wants_world && self.ready_for_hybrid();
         let mask = self.eye.mask(self.settings.anaglyph);
         let pause = self.settings.rt_pause && traced;
         if pause && let Some(mut view) = self.held.next(def) {
@@ -400,6 +409,9 @@ impl Renderer {
         let input = GatherInput::new(self.world.as_ref(), assets, &self.settings);
         let item = if traced {
             Item::Traced(Box::new(self.scene.gather_traced(&input, def)?))
+        } else if hybrid {
+            let (views, met) = self.scene.gather_hybrid(&input, def)?;
+            Item::Hybrid(views, Box::new(met))
         } else {
             Item::Classic(self.scene.gather_classic(&input, def)?)
         };
@@ -417,7 +429,7 @@ impl Renderer {
     /// Adds a polygon of the engine's collision debugging to the last queued view, unless that is traced. The lowest
     /// three bits of `color` are red, green and blue.
     pub fn add_debug_polygon(&mut self, color: u32, corners: &[Vec3]) {
-        if let Some((Item::Classic(scenes), _)) = self.queue.last_mut()
+        if let Some((Item::Classic(scenes) | Item::Hybrid(scenes, _), _)) = self.queue.last_mut()
             && let Some(view) = scenes.last_mut()
         {
             view.look.debug.add(color, corners, view.view.origin);
@@ -462,10 +474,7 @@ impl Renderer {
             }
             let made = lit || self.trace.is_none();
             if made {
-                let tracer = Tracer::of(self.device.info(), settings.rt_tracer);
-                let kept = self.trace_passes.take().filter(|p| p.tracer() == tracer);
-                let new = || Arc::new(PassSet::new(&self.device, tracer));
-                let passes = self.trace_passes.insert(kept.unwrap_or_else(new));
+                let passes = pass_set(&self.device, settings, &mut self.trace_passes);
                 let cells = settings.rt_grid_cells;
                 self.trace = Some(TraceLook::new(passes, cells, world, assets)?);
             }
@@ -479,6 +488,39 @@ impl Renderer {
         }
         Ok(self.trace.is_some())
     }
+
+    /// Makes the hybrid look at its first use; `false` without a map, or if the device lacks memory or the driver refuses
+    /// its shaders.
+    fn ready_for_hybrid(&mut self) -> bool {
+        let (Some(world), Some(assets)) = (&self.world, &self.assets) else {
+            return false;
+        };
+        if self.hybrid.is_none() && !self.lacks_hybrid {
+            let passes = pass_set(&self.device, &self.settings, &mut self.trace_passes);
+            match HybridLook::new(passes, self.settings.rt_grid_cells, world, assets) {
+                Ok(made) => self.hybrid = Some(made),
+                Err(e) => {
+                    log::warn!(
+                        "r_rt 2 is not possible here ({e}); the classic look is drawn. Set r_rt 0"
+                    );
+                    self.lacks_hybrid = true;
+                }
+            }
+        }
+        self.hybrid.is_some()
+    }
+}
+
+/// The pipelines of the tracer that the settings choose, made if they are missing.
+fn pass_set<'a>(
+    device: &Device,
+    settings: &Settings,
+    kept: &'a mut Option<Arc<PassSet>>,
+) -> &'a Arc<PassSet> {
+    let tracer = Tracer::of(device.info(), settings.rt_tracer);
+    let same = kept.take().filter(|p| p.tracer() == tracer);
+    let new = || Arc::new(PassSet::new(device, tracer));
+    kept.insert(same.unwrap_or_else(new))
 }
 
 impl Drop for Renderer {

@@ -10,8 +10,8 @@ mod value;
 use std::hash::Hasher;
 
 pub use choices::{
-    Anaglyph, DebugOutput, DenoiserChoice, HdrChoice, LightSelection, LowLatency, MapLightChoice,
-    ModelShadows, TextureMode, TracerChoice,
+    Anaglyph, DebugOutput, DenoiserChoice, HdrChoice, LightSelection, Look, LowLatency,
+    MapLightChoice, ModelShadows, TextureMode, TracerChoice,
 };
 pub use presets::{PRESETS, Preset};
 use row::written_back;
@@ -159,7 +159,7 @@ settings! { variables {
     no_cull: bool = "r_nocull", "0", CHEAT, None, Frame, GoesOn, "1 draws what is out of view as well.";
     show_cluster: i32 = "r_showcluster", "0", CHEAT, None, Frame, GoesOn, "1 prints the cluster and area of the camera when they change.";
     // settings of this renderer
-    rt: bool = "r_rt", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 traces light with rays, 0 draws the classic look. Switches at once.";
+    rt: Look = "r_rt", "0", ARCHIVE, kept(0.0, 2.0), Frame, GoesOn, "0 draws the classic look, 1 traces light with rays, 2 adds traced shadows and reflections to 0. Switches at once.";
     low_latency: LowLatency = "r_lowLatency", "2", ARCHIVE, kept(0.0, 2.0), Frame, GoesOn, "Frames that may wait for GPU and display: 0 two, 1 one; 2 also keeps the engine until the GPU needs its next frame.";
     rt_tracer: TracerChoice = "rt_tracer", "auto", ARCHIVE | LATCH, None, Start, GoesOn, "What follows the rays: auto, pipeline, query, compute or grid. A device without it gets what auto picks.";
     rt_grid_cells: u32 = "rt_gridCells", "0", ARCHIVE | LATCH, kept(0.0, 256.0), Start, GoesOn, "Cells of rt_tracer grid along the map's longest side; 0 picks them.";

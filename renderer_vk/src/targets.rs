@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::gpu::{self, Access, Device, Format, Image, ImageDesc, ImageUsage, Recorder};
 use crate::raster;
-use crate::settings::{ModelShadows, Settings};
+use crate::settings::{Look, ModelShadows, Settings};
 
 /// Colour and depth of a frame.
 pub struct FrameTargets {
@@ -46,7 +46,11 @@ impl FrameTargets {
             self.color = color_image(device, self.color.width(), self.color.height(), format)?;
             self.several = None;
         }
-        let wanted = if settings.rt { 0 } else { settings.multisample };
+        let wanted = if settings.rt == Look::Traced {
+            0
+        } else {
+            settings.multisample
+        };
         let stencil = settings.shadows == ModelShadows::Volumes;
         let samples = samples(device, wanted, stencil);
         let drawn = self.drawn().samples();

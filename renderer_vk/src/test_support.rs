@@ -211,6 +211,7 @@ impl Registration {
 
     pub fn input<'a>(&'a self, world: Option<&'a WorldData>) -> GatherInput<'a> {
         GatherInput {
+            traced_shadows: false,
             world,
             materials: &self.materials,
             models: &self.models,

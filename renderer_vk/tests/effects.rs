@@ -9,7 +9,7 @@ use q3bsp::builder::MapBuilder;
 use q3model::{Frame, Md3, PackedVertex, Surface};
 use relight::MemoryFiles;
 use renderer_vk::api::{EntityKind, Picture, RefDef, RefEntity, StretchedPicture};
-use renderer_vk::{Anaglyph, Error, Eye, ModelShadows, Renderer, RendererOptions, Settings};
+use renderer_vk::{Anaglyph, Error, Eye, Look, ModelShadows, Renderer, RendererOptions, Settings};
 
 /// Side of the picture, pixels.
 const SIDE: u32 = 64;
@@ -349,7 +349,7 @@ fn a_device_with_nothing_optional_draws_all_but_what_needs_it() {
     poor.settings.multisample = 4;
     poor.frame(&def(), &[cube(&poor)]);
     // rays find their way without the device's help
-    poor.settings.rt = true;
+    poor.settings.rt = Look::Traced;
     for _ in 0..2 {
         poor.frame(&def(), &[cube(&poor)]);
     }

@@ -10,7 +10,7 @@ use common::{frame, load_sample};
 use glam::Vec2;
 use relight::{GameFiles, MemoryFiles};
 use renderer_vk::api::{Picture, UiFrame, UiMesh, UiTexture, UiVertex};
-use renderer_vk::{HdrChoice, Renderer, RendererOptions, Settings};
+use renderer_vk::{HdrChoice, Look, Renderer, RendererOptions, Settings};
 
 const SIZE: (u32, u32) = (96, 54);
 
@@ -135,7 +135,7 @@ fn display_values_have_the_brightness_of_white_and_its_parts() {
 fn traced(hdr: HdrChoice) -> Option<(Picture, Vec<[f32; 3]>)> {
     let mut renderer = renderer(hdr)?;
     let settings = Settings {
-        rt: true,
+        rt: Look::Traced,
         rt_accumulate: true,
         rt_bounces: 0,
         rt_exposure: 3.0,

@@ -9,7 +9,7 @@ use glam::Vec3;
 use q3bsp::builder::MapBuilder;
 use relight::MemoryFiles;
 use renderer_vk::api::RefDef;
-use renderer_vk::{MapLightChoice, Renderer, RendererOptions, Settings, TracerChoice};
+use renderer_vk::{Look, MapLightChoice, Renderer, RendererOptions, Settings, TracerChoice};
 
 /// Materials of a map, each a room.
 const MATERIALS: usize = 4;
@@ -198,7 +198,7 @@ fn classic_maps_hold_no_more_after_sixty_than_after_a_few() {
 #[test]
 fn traced_maps_share_the_passes() {
     let settings = Settings {
-        rt: true,
+        rt: Look::Traced,
         rt_tracer: TracerChoice::Compute,
         rt_lights: MapLightChoice::Prior,
         ..Settings::full_size()

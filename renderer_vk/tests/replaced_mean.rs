@@ -6,7 +6,7 @@ mod common;
 
 use common::{frame, load_sample};
 use renderer_vk::api::RefDef;
-use renderer_vk::{Renderer, RendererOptions, Settings};
+use renderer_vk::{Look, Renderer, RendererOptions, Settings};
 
 const SIZE: (u32, u32) = (64, 36);
 
@@ -20,7 +20,7 @@ fn frames_show_the_given_mean_and_keep_it_until_their_content_changes() {
         return;
     };
     let settings = Settings {
-        rt: true,
+        rt: Look::Traced,
         rt_accumulate: true,
         rt_bounces: 0,
         rt_bloom: 0.0,

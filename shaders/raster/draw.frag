@@ -3,13 +3,15 @@
 // test), the blob of a dynamic light, or fog.
 // variants: MANY=-DMANY_STAGES
 // variants: MAPPED=-DMANY_STAGES -DSURFACE_MAPPING
+// variants: HYBRID=-DMANY_STAGES -DHYBRID
+// variants: HYBRID_MAPPED=-DMANY_STAGES -DSURFACE_MAPPING -DHYBRID
 // variants: COUNT=-DMANY_STAGES -DCOUNT_FRAGMENTS
 // Specialization constants (`draw.glsl`) remove unused code. Without `discard` the GPU tests depth before shading.
 #include "raster/draw.glsl"
 
 layout(location = 0) in vec4 in_uv[STAGE_PAIRS]; // two stages each
 layout(location = 2) in float in_clip;
-layout(location = 3) in flat uvec4 in_textures; // see `Draw`; with SURFACE_MAPPING, the index of the draw
+layout(location = 3) in flat uvec4 in_textures; // see `Draw`; with SURFACE_MAPPING or HYBRID, the index of the draw
 layout(location = 4) in vec4 in_color[STAGES];
 layout(location = 8) in flat vec4 in_flat_color[STAGES];
 
@@ -25,10 +27,15 @@ layout(location = 0) out vec4 out_color;
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Counter { uint fragments; };
 #endif
 
+#ifdef HYBRID
+#include "raster/hybrid.glsl"
+float shadow = 0.0; // part of the light that rays found missing
+#endif
+
 // The indices are dynamically uniform within a draw and need no `nonuniformEXT`.
 vec4 sample_stage(uint stage) {
     if ((TEXTURES >> stage & 1) == 0) return vec4(1.0);
-#ifdef SURFACE_MAPPING
+#if defined(SURFACE_MAPPING) || defined(HYBRID)
     uint handle = Draws(VIEW.draws).at[in_textures.x].textures[stage];
 #else
     uint handle = in_textures[stage];
@@ -43,7 +50,11 @@ vec4 stage_color(uint stage) {
 }
 
 vec4 stage_value(uint stage) {
-    return sample_stage(stage) * stage_color(stage);
+    vec4 value = sample_stage(stage) * stage_color(stage);
+#ifdef HYBRID
+    if ((SHADOWED >> stage & 1) != 0) value.rgb *= 1.0 - shadow;
+#endif
+    return value;
 }
 
 bool passes_alpha_test(uint stage, vec4 color) {
@@ -126,6 +137,10 @@ vec3 pixel_light() {
 #endif
 
 void main() {
+#ifdef HYBRID
+    bool dynamic = (SHADOWED & 16u) != 0;
+    shadow = hybrid_shadow(dynamic, dynamic ? Draws(VIEW.draws).at[in_textures.x].light : 0);
+#endif
     if (CLIP != 0 && in_clip < 0.0) discard;
     if (MODE == DRAW_LIGHT) {
         out_color = vec4(in_color[0].rgb * sample_stage(0).rgb, 1.0);
@@ -146,6 +161,9 @@ void main() {
         out_color = mapped_after(3, onto(out_color, 3));
 #endif
     }
+#ifdef HYBRID
+    if (dynamic) out_color.rgb *= 1.0 - shadow;
+#endif
 #ifdef COUNT_FRAGMENTS
     // no early depth test is declared, so that hidden fragments count too
     atomicAdd(Counter(push.overdraw).fragments, 1);

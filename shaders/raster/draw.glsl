@@ -44,7 +44,12 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Ras
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Views { RasterView view; };
 
 // `overdraw`: address of the fragment counter; 0: fragments are not counted.
+#ifdef HYBRID
+// `hybrid`: address of the `HybridView`.
+layout(push_constant, scalar) uniform Push { uint64_t view; uint64_t hybrid; } push;
+#else
 layout(push_constant, scalar) uniform Push { uint64_t view; uint64_t overdraw; } push;
+#endif
 
 // Shaders read single members where they need them: drivers are slow to reduce a copy of the whole structure to the
 // members that are used.

@@ -4,6 +4,7 @@
 // variants: MANY=-DMANY_STAGES
 // variants: MODIFIED=-DMANY_STAGES -DMODIFIED_TEXCOORDS
 // variants: MAPPED=-DMANY_STAGES -DMODIFIED_TEXCOORDS -DSURFACE_MAPPING
+// variants: HYBRID=-DMANY_STAGES -DMODIFIED_TEXCOORDS -DHYBRID
 // variants: DEPTH=-DDEPTH_ALONE
 #include "raster/draw.glsl"
 
@@ -15,7 +16,7 @@ layout(location = 2) out float out_clip;
 #ifndef DEPTH_ALONE
 // Only the elements that the draw's specialization constants use are written and read.
 layout(location = 0) out vec4 out_uv[STAGE_PAIRS]; // two stages each
-layout(location = 3) out flat uvec4 out_textures; // see `Draw`; with SURFACE_MAPPING, the index of the draw
+layout(location = 3) out flat uvec4 out_textures; // see `Draw`; with SURFACE_MAPPING or HYBRID, the index of the draw
 layout(location = 4) out vec4 out_color[STAGES];
 layout(location = 8) out flat vec4 out_flat_color[STAGES];
 #ifdef SURFACE_MAPPING
@@ -109,8 +110,12 @@ void main() {
     gl_Position = mat4(VIEW.world_to_clip[0], VIEW.world_to_clip[1], VIEW.world_to_clip[2], VIEW.world_to_clip[3]) * vec4(world, 1.0);
     out_clip = CLIP != 0 ? dot(VIEW.clip_plane.xyz, world) - VIEW.clip_plane.w : 0.0;
 #ifndef DEPTH_ALONE
+#ifdef HYBRID
+    out_textures = uvec4(gl_InstanceIndex); // the draw has the textures
+#else
     out_textures = uvec4(draws.at[gl_InstanceIndex].textures[0], draws.at[gl_InstanceIndex].textures[1],
         draws.at[gl_InstanceIndex].textures[2], draws.at[gl_InstanceIndex].textures[3]);
+#endif
 
     if (MODE == DRAW_LIGHT) {
         RasterLight light = RasterLights(VIEW.lights).at[draws.at[gl_InstanceIndex].light];

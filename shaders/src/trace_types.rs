@@ -22,7 +22,7 @@ pub use lights::{
 };
 pub use photons::{BodyTriangle, Photon, PhotonCell, PhotonView};
 pub use structures::{
-    BvhInstance, BvhNode, BvhTriangle, FilterStep, GeometryRecord, GridRecord, PassStep,
+    BvhInstance, BvhNode, BvhTriangle, FilterStep, GeometryRecord, GridRecord, HybridStep, PassStep,
 };
 pub use surroundings::{FlareView, FogView, MirrorPlane, PortalRecord, SkyRecord, TransportView};
 pub use view::{CameraView, ExposureView, ImageView, PostView, SceneView, TargetView};

@@ -345,6 +345,48 @@ pub struct RasterLight {
     pub color: Vec3,
 }
 
+/// What rays found for a pixel of half the picture's size, in the hybrid look.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct HybridTexel {
+    /// Bit i: something is between the surface and dynamic light i.
+    pub hidden: u32,
+    /// Part of the hemisphere, weighted by the cosine, that models occlude.
+    pub occlusion: f32,
+    /// 1 over the depth `w` of clip space; 0: no surface of the map.
+    pub inverse_depth: f32,
+    /// Unit normal of the surface, octahedral, two 16-bit signed normalized values.
+    pub normal: u32,
+}
+
+/// A view of the hybrid look: input of its rays, and their results as draws read them.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct HybridView {
+    /// [`HybridTexel`]s.
+    pub texels: u64,
+    /// The same between the steps of the filter.
+    pub between: u64,
+    /// [`RasterLight`]s of the view.
+    pub lights: u64,
+    /// Number of lights, at most 32.
+    pub light_count: u32,
+    /// Storage image of the surfaces of the map, RGBA32F: octahedral normal, 0, 1 over `w`.
+    pub surfaces: u32,
+    /// Texels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Centre of projection.
+    pub eye: Vec3,
+    /// A point at depth `w` of the texel (x, y) is `eye + w (corner + x right + y down)`.
+    pub corner: Vec3,
+    /// See `corner`.
+    pub right: Vec3,
+    /// See `corner`.
+    pub down: Vec3,
+}
+
 /// A flare: point of its visibility test, and its square.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]

@@ -32,12 +32,19 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Li
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightRows { LightRow at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer DynamicRows { DynamicRow at[]; };
 
-#ifdef FILTER_STEP
+#if defined(FILTER_STEP)
 layout(push_constant, scalar) uniform Push { FilterStep push; };
+#elif defined(HYBRID_STEP)
+layout(push_constant, scalar) uniform Push { HybridStep push; };
 #else
 layout(push_constant, scalar) uniform Push { PassStep push; };
 #endif
+#ifdef HYBRID_STEP
+uint64_t traced_view = push.view; // or `push.models`
+#define VIEW (TraceViews(traced_view).view)
+#else
 #define VIEW (TraceViews(push.view).view)
+#endif
 
 // Index of a pixel's texel in a buffer.
 uint place_of(ivec2 pixel) { return uint(pixel.y) * VIEW.width + uint(pixel.x); }

@@ -4,7 +4,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use renderer_vk::api::RefEntity;
-use renderer_vk::{LightSelection, Renderer, RendererOptions, Settings};
+use renderer_vk::{LightSelection, Look, Renderer, RendererOptions, Settings};
 use serde_json::{Value, json};
 
 use crate::chosen::parse_view;
@@ -276,7 +276,7 @@ pub fn run(args: &EstimatorsArgs) -> Result<()> {
     for map in &args.chosen.maps {
         let (files, map) = open(map, &args.chosen.game)?;
         let base = Settings {
-            rt: true,
+            rt: Look::Traced,
             rt_accumulate: true,
             rt_auto_exposure: false,
             // only light sampling may cause differences

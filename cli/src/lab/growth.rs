@@ -16,7 +16,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use renderer_vk::api::Picture;
-use renderer_vk::{MapLightChoice, Renderer, RendererOptions, Settings};
+use renderer_vk::{Look, MapLightChoice, Renderer, RendererOptions, Settings};
 
 use self::axis::{Axis, Case, Sizes, parse_axis};
 use self::bound::{Measured, Report, Row};
@@ -71,7 +71,7 @@ pub fn run(args: &GrowthArgs) -> Result<()> {
         false => args.axis.clone(),
     };
     let base = Settings {
-        rt: true,
+        rt: Look::Traced,
         rt_lights: MapLightChoice::Prior,
         ..Settings::full_size()
     };

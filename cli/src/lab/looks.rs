@@ -8,7 +8,7 @@ use clap::Args;
 use relight::compare::Rgb8;
 use relight::viewpoints::VIEW_HEIGHT;
 use renderer_vk::api::RefDef;
-use renderer_vk::{MapLightChoice, Renderer, RendererOptions, Settings};
+use renderer_vk::{Look, MapLightChoice, Renderer, RendererOptions, Settings};
 use serde_json::{Value, json};
 
 use super::chromaticity::ColorDifference;
@@ -188,7 +188,10 @@ fn one(args: &LooksArgs, map: &str) -> Result<Sums> {
     renderer.keep_calibrations(args.cache.clone());
     let chosen = args.set.change([], Settings::full_size());
     let settings = |look: Option<MapLightChoice>| Settings {
-        rt: look.is_some(),
+        rt: match look {
+            Some(_) => Look::Traced,
+            None => Look::Classic,
+        },
         // The classic look does not read it.
         rt_lights: look.unwrap_or_default(),
         rt_accumulate: !args.no_accumulation,

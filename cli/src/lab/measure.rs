@@ -27,7 +27,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use relight::compare::{Rgb8, compare};
 use relight::viewpoints::VIEW_HEIGHT;
 use renderer_vk::api::DynamicLight;
-use renderer_vk::{Renderer, RendererOptions, Settings};
+use renderer_vk::{Look, Renderer, RendererOptions, Settings};
 use serde_json::{Value, json};
 
 use self::clips::Clip;
@@ -176,8 +176,8 @@ fn brightness(
         }
         anyhow::Ok(stage.picture()?.mean_luminance())
     };
-    let classic = seen(false, 1)?;
-    Ok(seen(true, ADAPTATION)? / classic.max(1.0e-3))
+    let classic = seen(Look::Classic, 1)?;
+    Ok(seen(Look::Traced, ADAPTATION)? / classic.max(1.0e-3))
 }
 
 /// Measures one place.
@@ -411,7 +411,7 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
         })
         .context("nothing to measure without a Vulkan device")?;
         let base = Settings {
-            rt: true,
+            rt: Look::Traced,
             rt_auto_exposure: false,
             ..Settings::full_size()
         };

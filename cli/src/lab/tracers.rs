@@ -16,7 +16,9 @@ use glam::Vec3;
 use indicatif::{ProgressBar, ProgressStyle};
 use relight::GameFiles;
 use relight::viewpoints::VIEW_HEIGHT;
-use renderer_vk::{MapLightChoice, Renderer, RendererOptions, Settings, Spread, TracerChoice};
+use renderer_vk::{
+    Look, MapLightChoice, Renderer, RendererOptions, Settings, Spread, TracerChoice,
+};
 
 use self::report::{Report, Row};
 use crate::cameras::{Place, places};
@@ -168,7 +170,7 @@ pub fn run(args: &TracersArgs) -> Result<()> {
         });
     }
     let base = Settings {
-        rt: true,
+        rt: Look::Traced,
         rt_lights: MapLightChoice::Prior,
         rt_accumulate: true,
         rt_auto_exposure: false,

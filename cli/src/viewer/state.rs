@@ -431,7 +431,7 @@ impl Viewer {
     /// Draws the looks, then the panels.
     fn draw(&mut self, ui: renderer_vk::api::UiFrame) -> Result<()> {
         let traces = self.shown != Shown::Classic && self.found;
-        self.settings.rt = traces;
+        self.settings.rt = if traces { Look::Traced } else { Look::Classic };
         self.settings.rt_accumulate = self.shown == Shown::Reference;
         self.renderer.set_settings(&self.settings);
         self.renderer.begin_frame((self.time * 1000.0) as i32);

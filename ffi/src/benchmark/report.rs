@@ -1,7 +1,7 @@
 //! The result of a benchmark: JSON, and a line to share.
 
 use super::Samples;
-use renderer_vk::settings::{Preset, ROWS, Settings};
+use renderer_vk::settings::{Look, Preset, ROWS, Settings};
 use renderer_vk::{Costs, Spread};
 use serde::{Serialize, Serializer};
 
@@ -55,7 +55,7 @@ impl<'a> Report<'a> {
             let value = row.text(settings);
             (value != row.text(&defaults)).then_some((row.spec.name, value))
         });
-        let traced = settings.rt;
+        let traced = settings.rt == Look::Traced;
         let preset = Preset::current(settings).filter(|_| traced);
         let median = |(name, times): &'a (String, Vec<f32>)| {
             Some((name.as_str(), Spread::of(times)?.median))
@@ -71,7 +71,7 @@ impl<'a> Report<'a> {
             version: env!("CARGO_PKG_VERSION"),
             map,
             route,
-            look: if traced { "traced" } else { "classic" },
+            look: settings.rt.name(),
             width: costs.size.0,
             height: costs.size.1,
             preset: preset.map(|preset| preset.name),
@@ -136,7 +136,7 @@ mod tests {
             passes: vec![("z".into(), vec![0.5]), ("a".into(), vec![0.25, 1.0])],
         };
         let mut settings = Settings {
-            rt: true,
+            rt: Look::Traced,
             ..Settings::default()
         };
         let report = Report::new(("dm1", "path"), &settings, ("1.2", &costs), &samples);
@@ -169,7 +169,7 @@ mod tests {
         );
 
         // the classic look, without GPU times
-        settings.rt = false;
+        settings.rt = Look::Classic;
         let nothing = Samples::default();
         let report = Report::new(("dm1", "path"), &settings, ("1.2", &costs), &nothing);
         let json: serde_json::Value = serde_json::from_str(&report.json()).expect("JSON");

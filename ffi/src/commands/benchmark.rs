@@ -11,7 +11,7 @@ use crate::panel::Panel;
 use crate::session::{Front, with_renderer};
 use relight::viewpoints;
 use renderer_vk::path::{self, PathPoint};
-use renderer_vk::{Costs, PassCost, Renderer};
+use renderer_vk::{Costs, Look, PassCost, Renderer};
 use std::ffi::CString;
 use std::time::{Duration, Instant};
 
@@ -117,7 +117,7 @@ fn obstacle(front: &Front) -> Option<&'static str> {
         Some("rt_screenshot is drawing: wait until it has written its picture")
     } else if matches!(front.panel, Some(Panel::Photo(_))) {
         Some("photo mode keeps the picture still: give rt_photo to end it first")
-    } else if settings.rt && settings.rt_pause {
+    } else if settings.rt == Look::Traced && settings.rt_pause {
         Some("rt_pause keeps the picture still: set rt_pause 0 first")
     } else if settings.no_refresh || settings.skip_back_end {
         Some("nothing is drawn: set r_norefresh 0 and r_skipBackEnd 0 first")

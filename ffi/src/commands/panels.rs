@@ -7,7 +7,7 @@ use crate::panel::photo::{Kind, Photo};
 use crate::panel::pointer::keys_of_word;
 use crate::session::Front;
 use crate::show_panel::{close, open};
-use renderer_vk::Renderer;
+use renderer_vk::{Look, Renderer};
 
 /// Opens the menu, or closes it. With a word: a key for the open menu.
 pub(super) unsafe extern "C" fn menu() {
@@ -66,7 +66,7 @@ fn toggle(renderer: &mut Renderer, front: &mut Front) -> Option<String> {
         return Some(format!("rt_photo: {}", benchmark::IN_PROGRESS));
     }
     match front.world_view {
-        Some(view) if front.settings.rt && renderer.world().is_some() => {
+        Some(view) if front.settings.rt == Look::Traced && renderer.world().is_some() => {
             let photo = Photo::new(&view, renderer.size());
             open(renderer, front, Panel::Photo(Box::new(photo)));
             None

@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use gui::egui::{self, Context, RichText};
 use gui::{Change, CostHistory, Gui, frame_time, main_settings, presets};
-use renderer_vk::Settings;
 use renderer_vk::api::UiFrame;
+use renderer_vk::{Look, Settings};
 
 use super::pointer::{self, Pointer};
 use crate::window::input::Input;
@@ -120,12 +120,16 @@ fn show(
         .show(context, |ui| {
             let mut changes = Vec::new();
             ui.horizontal(|ui| {
-                for (value, name) in [(false, "Classic look"), (true, "Traced look")] {
+                for (value, name) in [
+                    (Look::Classic, "Classic look"),
+                    (Look::Hybrid, "Hybrid look"),
+                    (Look::Traced, "Traced look"),
+                ] {
                     let chosen = facts.settings.rt == value;
                     if ui.selectable_label(chosen, name).clicked() && !chosen {
                         changes.push(Change {
                             name: "r_rt",
-                            value: u8::from(value).to_string(),
+                            value: (value as u32).to_string(),
                         });
                     }
                 }

@@ -14,6 +14,7 @@ use support::slice::{self, part};
 
 use super::aids::Aids;
 use super::depth_first;
+use super::hybrid;
 use super::light_reach::LightReach;
 use super::list::{
     Call, DepthRange, DrawList, Statics, faces, fog_adjust, light_source_factor, shows_lightmap,
@@ -74,6 +75,13 @@ pub(super) struct Group {
     /// First index and number of indices.
     span: (u32, u32),
     range: DepthRange,
+}
+
+impl Group {
+    /// Whether it is part of the map, in its rigid shape.
+    fn is_of_map(&self) -> bool {
+        !self.common.dynamic && self.range == DepthRange::Normal
+    }
 }
 
 /// Parameters of all groups.
@@ -266,7 +274,7 @@ impl DrawList {
     fn add_stages(&mut self, material: &Material, groups: &[Group], context: &GroupContext<'_>) {
         let plain = context.plain_state(material);
         for group in groups {
-            if !group.common.dynamic && group.range == DepthRange::Normal {
+            if group.is_of_map() {
                 let (first, count) = group.surfaces;
                 let surfaces = part(context.surfaces, first..first + count);
                 self.note_depth(material, plain, surfaces);
@@ -300,6 +308,9 @@ impl DrawList {
         let lightmap = group.common.lightmap;
         let (mut shading, mut draw) =
             stages.passes(material, passes, instance, lightmap, fog_adjust, draw);
+        if group.is_of_map() && stages.traced_shadows {
+            shading.shadowed = hybrid::lit_stages(stages.materials, &shading, &draw, lightmap);
+        }
         // of two textures in one pass the second is shown: the lightmap, if the pass has one
         if aids.lightmaps && pass.stage_count == 2 {
             (shading, draw) = match (shows_lightmap(pass, stages.materials), lightmap) {
@@ -358,7 +369,7 @@ impl DrawList {
                 light: i,
                 ..plain_draw(group)
             };
-            let (shading, draw) = match pixel_stage {
+            let (mut shading, draw) = match pixel_stage {
                 Some(stage) => {
                     let fog = fogged(material, draw.fog).map_or(0, |_| draw.fog);
                     let draw = Draw { fog, ..draw };
@@ -367,6 +378,9 @@ impl DrawList {
                 }
                 None => context.stages.light(draw),
             };
+            if group.is_of_map() && context.stages.traced_shadows {
+                shading.shadowed = hybrid::DYNAMIC_LIGHT;
+            }
             let source = match pixel_stage {
                 Some(_) => pixel_light_source(material),
                 None => light_source_factor(light),

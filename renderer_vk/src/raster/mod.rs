@@ -10,6 +10,7 @@ mod depth_first;
 mod expected;
 mod flares;
 mod groups;
+mod hybrid;
 mod light_reach;
 mod list;
 mod overdraw;
@@ -32,6 +33,7 @@ use shaders::types::{Instance, MaterialBuffers, RasterLight, RasterView};
 pub use aids::{Aids, image_sheet};
 pub use expected::{ExpectedWorld, expected_instance};
 pub use flares::{FlareTest, Flares, window_to_clip};
+pub use hybrid::{HybridImages, HybridSurfaces};
 pub use list::{DrawList, Statics};
 pub use overlay::{Overlay, Picture2d, overlay_instance};
 pub use present::{Display, Present};
@@ -42,7 +44,7 @@ pub use ui::{UiMeshes, UiTextures};
 
 use crate::api::DynamicLight;
 use crate::gpu::{
-    self, Device, Format, Image, ImageDesc, ImageUsage, Pass, Recorder, Rendering, Viewport,
+    self, Buffer, Device, Format, Image, ImageDesc, ImageUsage, Pass, Recorder, Rendering, Viewport,
 };
 use crate::scene::{ShadowVolumes, View};
 use cover::Cover;
@@ -103,6 +105,15 @@ pub struct ViewParameters<'a> {
     pub clear_color: Option<[f32; 4]>,
     /// Shadow volumes with their view; ignored if the depth image has no stencil.
     pub shadows: Option<(&'a ShadowVolumes, &'a View)>,
+}
+
+/// A draw list with its view in the frame's memory.
+pub struct Uploaded {
+    views: ViewAddresses,
+    index_buffer: Buffer,
+    index_offset: u64,
+    /// Address of the [`HybridView`](shaders::types::HybridView) that draws read; 0: none does.
+    pub hybrid: u64,
 }
 
 /// Device addresses of the `RasterView`s of a view.
@@ -214,6 +225,43 @@ impl Raster {
         list: &DrawList,
         p: &ViewParameters<'_>,
     ) -> Result<(), gpu::Error> {
+        let uploaded = self.upload(recorder, list, p)?;
+        self.record_uploaded(recorder, name, target, list, p, &uploaded)
+    }
+
+    /// Uploads a draw list and its view.
+    ///
+    /// # Errors
+    /// The device is out of memory.
+    pub fn upload(
+        &mut self,
+        recorder: &mut Recorder,
+        list: &DrawList,
+        p: &ViewParameters<'_>,
+    ) -> Result<Uploaded, gpu::Error> {
+        let views = self.upload_view(recorder, list, p)?;
+        let (index_buffer, index_offset) = recorder.arena().push_indices(&list.indices)?;
+        Ok(Uploaded {
+            views,
+            index_buffer,
+            index_offset,
+            hybrid: 0,
+        })
+    }
+
+    /// Records an uploaded draw list as a pass called `name`.
+    ///
+    /// # Errors
+    /// The device is out of memory or cannot make a pipeline.
+    pub fn record_uploaded(
+        &mut self,
+        recorder: &mut Recorder,
+        name: &str,
+        target: Target<'_>,
+        list: &DrawList,
+        p: &ViewParameters<'_>,
+        uploaded: &Uploaded,
+    ) -> Result<(), gpu::Error> {
         let kind = TargetKind {
             counted: self.overdraw.address() != 0,
             ..target.kind()
@@ -221,14 +269,12 @@ impl Raster {
         for call in &list.calls {
             self.pipelines.prepare(kind, call.state)?;
         }
-        let views = self.upload_view(recorder, list, p)?;
-        let (index_buffer, index_offset) = recorder.arena().push_indices(&list.indices)?;
         let shadows = match p.shadows {
             Some((volumes, view)) if kind.depth.has_stencil() && !volumes.ranges.is_empty() => {
-                let uploaded = self
+                let prepared = self
                     .shadows
                     .prepare(recorder, &self.device, kind, volumes)?;
-                Some((uploaded, volumes, view))
+                Some((prepared, volumes, view))
             }
             _ => None,
         };
@@ -268,10 +314,10 @@ impl Raster {
         if shadows.is_some() {
             pass.clear_stencil_rect([x, y, width, height]);
         }
-        pass.bind_index_buffer(&index_buffer, index_offset);
-        self.draw_calls(&mut pass, kind, list, p, views);
-        if let Some((uploaded, volumes, view)) = &shadows {
-            self.shadows.draw(&mut pass, kind, uploaded, volumes, view);
+        pass.bind_index_buffer(&uploaded.index_buffer, uploaded.index_offset);
+        self.draw_calls(&mut pass, kind, list, p, uploaded);
+        if let Some((prepared, volumes, view)) = &shadows {
+            self.shadows.draw(&mut pass, kind, prepared, volumes, view);
         }
         Ok(())
     }
@@ -284,11 +330,7 @@ impl Raster {
         p: &ViewParameters<'_>,
     ) -> Result<ViewAddresses, gpu::Error> {
         self.lights.clear();
-        self.lights.extend(p.lights.iter().map(|l| RasterLight {
-            origin: l.origin,
-            radius: l.radius,
-            color: l.color,
-        }));
+        self.lights.extend(p.lights.iter().map(raster_light));
         let arena = recorder.arena();
         let view = RasterView {
             world_to_clip: p.world_to_clip.to_cols_array_2d(),
@@ -330,9 +372,16 @@ impl Raster {
         kind: TargetKind,
         list: &DrawList,
         p: &ViewParameters<'_>,
-        views: ViewAddresses,
+        uploaded: &Uploaded,
     ) {
+        let views = uploaded.views;
         let overdraw = self.overdraw.address();
+        // pipelines that count fragments read no shadows
+        let second = if overdraw != 0 {
+            overdraw
+        } else {
+            uploaded.hybrid
+        };
         let mut state = None;
         let mut range = None;
         let mut pushed = 0;
@@ -344,7 +393,8 @@ impl Raster {
                 pass.bind_graphics(pipeline);
                 state = Some(call.state);
                 // Mesa's software driver drops fragment push constants after a pipeline that uses none
-                if overdraw != 0 || call.state.shading.mapping != 0 {
+                let shading = call.state.shading;
+                if overdraw != 0 || shading.mapping != 0 || shading.shadowed != 0 {
                     pushed = 0;
                 }
             }
@@ -354,7 +404,7 @@ impl Raster {
                 _ => views.all,
             };
             if pushed != wanted {
-                pass.push(&[wanted, overdraw]);
+                pass.push(&[wanted, second]);
                 pushed = wanted;
             }
             if range != Some(call.range) {
@@ -363,6 +413,15 @@ impl Raster {
             }
             pass.draw_indexed(call.index_count, 1, call.first_index, 0, call.draw);
         }
+    }
+}
+
+/// A dynamic light as shaders read it.
+pub fn raster_light(light: &DynamicLight) -> RasterLight {
+    RasterLight {
+        origin: light.origin,
+        radius: light.radius,
+        color: light.color,
     }
 }
 

@@ -132,10 +132,13 @@ impl Pipelines {
         let several_inputs = state.shading.mode == c::DRAW_PIXEL_LIGHT;
         let many = state.shading.has_stages() || several_inputs || modified || target.counted;
         let mapped = state.shading.mapping != 0 && !target.counted;
+        let hybrid = state.shading.shadowed != 0 && !target.counted;
         let vertex = if depth_alone {
             &shaders::RASTER_DRAW_VERT_DEPTH
         } else if mapped {
             &shaders::RASTER_DRAW_VERT_MAPPED
+        } else if hybrid {
+            &shaders::RASTER_DRAW_VERT_HYBRID
         } else if modified {
             &shaders::RASTER_DRAW_VERT_MODIFIED
         } else if many {
@@ -145,6 +148,10 @@ impl Pipelines {
         };
         let fragment = if target.counted {
             &shaders::RASTER_DRAW_FRAG_COUNT
+        } else if hybrid && mapped {
+            &shaders::RASTER_DRAW_FRAG_HYBRID_MAPPED
+        } else if hybrid {
+            &shaders::RASTER_DRAW_FRAG_HYBRID
         } else if mapped {
             &shaders::RASTER_DRAW_FRAG_MAPPED
         } else if many {

@@ -3,6 +3,7 @@
 
 use glam::Vec2;
 use shaders::constant_ids::raster::draw as id;
+use shaders::constant_ids::raster::hybrid;
 use shaders::types::constants as c;
 use shaders::types::{DRAW_STAGES, Draw, Instance};
 use shaderscript::{AlphaGen, Cull, RgbGen, TcMod, WaveFunction, eval};
@@ -70,10 +71,12 @@ pub struct Shading {
     pub tc_gen: PerStage,
     /// `MAPPING_*`; 0: none.
     pub mapping: u32,
+    /// `SHADOWED` of `hybrid.glsl`; 0: none.
+    pub shadowed: u32,
 }
 
 /// Number of specialization constants.
-pub const CONSTANTS: usize = 14;
+pub const CONSTANTS: usize = 15;
 
 impl Shading {
     /// Uniformly white.
@@ -92,6 +95,7 @@ impl Shading {
         alpha_gen: PerStage::NONE,
         tc_gen: PerStage::NONE,
         mapping: 0,
+        shadowed: 0,
     };
 
     /// The spot of a dynamic light.
@@ -112,7 +116,13 @@ impl Shading {
     pub fn second_alone(mut self) -> Self {
         self.combine.set(1, c::COMBINE_REPLACE);
         self.mapping = 0;
+        self.shadowed = 0;
         self
+    }
+
+    /// Whether a later place of the draw has a stage.
+    pub(super) fn combines(&self, place: usize) -> bool {
+        self.combine.0 >> (PerStage::BITS * place) & 0xF != c::COMBINE_NONE
     }
 
     /// Whether the draw has several stages.
@@ -137,6 +147,7 @@ impl Shading {
             (id::ALPHA_GEN, self.alpha_gen.0),
             (id::TC_GEN, self.tc_gen.0),
             (id::MAPPING, self.mapping),
+            (hybrid::SHADOWED, self.shadowed),
         ]
     }
 }
@@ -207,6 +218,8 @@ pub struct StageContext<'a> {
     pub mapping: SurfaceMapping,
     /// Replaces every texture (`r_nobind`).
     pub only_texture: Option<u32>,
+    /// Rays find the shadows of models and of dynamic lights.
+    pub traced_shadows: bool,
 }
 
 impl StageContext<'_> {

@@ -13,7 +13,7 @@ use crate::gpu::{ColorMask, Encoding, Format, Image, ImageDesc, ImageUsage, Reco
 use crate::half::half;
 use crate::raster::{self, Display, Present};
 use crate::scene::Statistics;
-use crate::settings::Settings;
+use crate::settings::{Look, Settings};
 use crate::stereo::Eye;
 use crate::trace::TraceLook;
 
@@ -140,6 +140,10 @@ impl Renderer {
                 // held views are copies: keeping their memory would leak a copy per frame
                 Item::Traced(_) if self.settings.rt_pause => {}
                 Item::Traced(scene) => self.scene.recycle_traced(*scene),
+                Item::Hybrid(scenes, met) => {
+                    self.scene.recycle_classic(scenes);
+                    self.scene.recycle_traced(*met);
+                }
             }
         }
     }
@@ -180,7 +184,7 @@ impl Renderer {
             self.shown_anaglyph = self.settings.anaglyph;
             self.targets.clear(&mut recorder)?;
         }
-        let measure = self.settings.measure_overdraw && !self.settings.rt;
+        let measure = self.settings.measure_overdraw && self.settings.rt != Look::Traced;
         self.raster.begin_frame(&mut recorder, measure)?;
         let pixels = self.targets.color().width() as f32 * self.targets.color().height() as f32;
         stats.overdraw = self.raster.fragments() as f32 / pixels;
@@ -200,12 +204,14 @@ impl Renderer {
                 raster: &mut self.raster,
                 flares: &mut self.flares,
                 trace: self.trace.as_mut(),
+                hybrid: self.hybrid.as_mut(),
+                hybrid_surfaces: &mut self.hybrid_surfaces,
                 list: &mut self.list,
             };
             for (item, mask) in &self.queue {
                 context.mask = *mask;
                 context.record(&mut recorder, item)?;
-                if let Item::Classic(scenes) = item {
+                if let Item::Classic(scenes) | Item::Hybrid(scenes, _) = item {
                     for scene in scenes {
                         stats.scene.add(&scene.look.statistics);
                     }
@@ -287,7 +293,7 @@ impl Renderer {
         let traced = |(item, _): &(Item, _)| matches!(item, Item::Traced(_));
         let plain = self.settings.display_gamma() == 1.0
             && self.settings.effective_overbright_bits() == 0
-            && !self.settings.rt
+            && self.settings.rt != Look::Traced
             && !self.queue.iter().any(traced);
         if self.encoding != Encoding::Srgb {
             return raster::WIDE_FORMAT;

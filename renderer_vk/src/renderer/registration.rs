@@ -76,6 +76,7 @@ impl Renderer {
             pixel_lights: raster::PixelLights::new(&self.settings),
             mapping: raster::SurfaceMapping::new(&self.settings),
             only_texture: None,
+            traced_shadows: false,
         };
         let surfaces = self.world.iter().flat_map(|world| &world.surfaces);
         let mut pages = surfaces.map(|surface| surface.lightmap);
@@ -120,6 +121,8 @@ impl Renderer {
         self.held.release();
         self.still.cancel();
         self.trace = None;
+        self.hybrid = None;
+        self.lacks_hybrid = false;
         self.world = None;
         self.assets = None;
         self.entity_tokens = EntityTokens::default();

@@ -1,5 +1,6 @@
 //! `rt_screenshot`: an accumulated picture of the view at any size; each frame of the game traces a few of its frames.
 
+use crate::settings::Look;
 use std::time::Instant;
 
 use super::Renderer;
@@ -50,7 +51,7 @@ impl Renderer {
         size: Option<(u32, u32)>,
         radiance: bool,
     ) -> Result<(), String> {
-        if !self.settings.rt {
+        if self.settings.rt != Look::Traced {
             return Err("the traced look is off; set r_rt 1".into());
         }
         if self.still.wanted.is_some() || self.still.still.is_some() {

@@ -202,7 +202,9 @@ impl<'a> Gatherer<'a> {
 
     fn gather(&mut self, pvs_origin: Vec3, out: &mut ViewScene) {
         self.clear(out);
-        self.scratch.rigid.begin_view();
+        if self.traced {
+            self.scratch.rigid.begin_view();
+        }
         if let Some(world) = self.world {
             self.find_visible(world, pvs_origin, out);
             self.add_world(world, out);
@@ -546,7 +548,7 @@ impl<'a> Gatherer<'a> {
             let range = poly.first_vertex..poly.first_vertex + poly.vertex_count;
             let corners = slice::part(self.poly_vertices, range);
             let darkens = || only_darkens(&self.input.materials.get(poly.material).shader);
-            if self.traced && darkens() && is_painted_shadow(corners, self.entities) {
+            if self.has_traced_shadows() && darkens() && is_painted_shadow(corners, self.entities) {
                 continue;
             }
             let bounds = Aabb::of(corners.iter().map(|v| v.position));

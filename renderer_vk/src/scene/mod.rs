@@ -310,6 +310,8 @@ pub struct GatherInput<'a> {
     pub skins: &'a Skins,
     /// Settings.
     pub settings: &'a Settings,
+    /// Rays find the shadows of models in views of the classic look.
+    pub traced_shadows: bool,
 }
 
 impl<'a> GatherInput<'a> {
@@ -321,6 +323,7 @@ impl<'a> GatherInput<'a> {
             models: &assets.models,
             skins: &assets.skins,
             settings,
+            traced_shadows: false,
         }
     }
 }
@@ -440,6 +443,26 @@ impl Scene {
         def: &RefDef,
     ) -> Result<TracedScene, Error> {
         self.gather(input, |scene| gather::traced_view(scene, input, def))
+    }
+
+    /// Turns the added content into views of the classic look whose shadows are traced, and into the view that their rays
+    /// meet.
+    ///
+    /// # Errors
+    /// As [`gather_classic`](Self::gather_classic).
+    pub fn gather_hybrid(
+        &mut self,
+        input: &GatherInput<'_>,
+        def: &RefDef,
+    ) -> Result<(Vec<ClassicScene>, TracedScene), Error> {
+        let input = &GatherInput {
+            traced_shadows: true,
+            ..*input
+        };
+        self.gather(input, |scene| {
+            let views = gather::classic_views(scene, input, def);
+            (views, gather::traced_view(scene, input, def))
+        })
     }
 
     fn gather<T>(

@@ -348,9 +348,14 @@ impl Gatherer<'_> {
         true
     }
 
+    /// Whether rays find the shadows of models, so that none is drawn.
+    pub(super) fn has_traced_shadows(&self) -> bool {
+        self.traced || self.input.traced_shadows
+    }
+
     /// The material of an entity's planar shadow (`cg_shadows 3`), if it casts one. Traced views have traced shadows.
     fn shadow_material(&self, entity: &RefEntity) -> Option<u32> {
-        let casts = !self.traced
+        let casts = !self.has_traced_shadows()
             && self.input.settings.shadows == ModelShadows::Planar
             && entity.renderfx & renderfx::SHADOW_PLANE != 0
             && entity.shadow_plane.is_finite();
@@ -360,6 +365,7 @@ impl Gatherer<'_> {
     /// Whether an entity casts shadow volumes (`cg_shadows 2`).
     fn casts_volumes(&self, entity: &RefEntity) -> bool {
         self.input.settings.shadows == ModelShadows::Volumes
+            && !self.has_traced_shadows()
             && entity.renderfx & (renderfx::NO_SHADOW | renderfx::DEPTH_HACK) == 0
     }
 

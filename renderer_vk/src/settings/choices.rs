@@ -6,6 +6,29 @@ use super::row::Kind;
 use super::value::{Given, Value, named, numbered};
 
 numbered! {
+    /// A look of a view.
+    Look {
+        /// As the engine's own renderer draws it.
+        Classic = 0,
+        /// Ray traced.
+        Traced = 1,
+        /// The classic look with traced shadows of models and of dynamic lights, and traced reflections.
+        Hybrid = 2,
+    }
+}
+
+impl Look {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Classic => "classic",
+            Self::Traced => "traced",
+            Self::Hybrid => "hybrid",
+        }
+    }
+}
+
+numbered! {
     /// How a traced light sample selects its light from a cell's list.
     LightSelection {
         /// Resampled importance sampling among a few candidates.

@@ -29,15 +29,24 @@ fn hit_group(kind: Kind) -> u32 {
     u32::from(kind == Kind::Translucent)
 }
 
+/// A top level, as shaders address it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Top {
+    /// Bindless index of the driver's structure.
+    pub scene: u32,
+    /// Device address of the nodes of our own; 0: it is empty.
+    pub nodes: u64,
+    /// Device address of the `BvhInstance`s, in leaf order.
+    pub placed: u64,
+}
+
 /// Acceleration structures and geometry of one frame, as shaders address them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AccelOutput {
-    /// Bindless index of the driver's top-level structure.
-    pub scene: u32,
-    /// Device address of the nodes of our own top level; 0: the scene is empty.
-    pub nodes: u64,
-    /// Device address of the `BvhInstance`s, in leaf order of the top level.
-    pub placed: u64,
+    /// The top level.
+    pub top: Top,
+    /// A top level of models that rest or move, without the map; only of an [`Accel::with_models`].
+    pub models: Top,
     /// Device address of the `GeometryRecord`s.
     pub geometries: u64,
     /// Device address of the view's `Instance`s.
@@ -84,6 +93,8 @@ struct Placement<'a> {
     record: u32,
     mask: u8,
     kind: Kind,
+    /// It belongs to a model.
+    of_model: bool,
 }
 
 /// The placements of a view.
@@ -111,6 +122,7 @@ impl<'a> Placements<'a> {
             record: u32::try_from(self.records.len()).unwrap_or(u32::MAX),
             mask,
             kind,
+            of_model: false,
         });
         self.records.extend(records);
     }
@@ -160,6 +172,19 @@ struct DriverStructures {
     tlas: Tlas,
     /// Input of the last build of `tlas`: serial of the map's geometry, and all instances.
     placed: Option<(u64, Vec<gpu::Instance>)>,
+    /// The models alone.
+    models: Option<Tlas>,
+}
+
+impl DriverStructures {
+    /// Both top levels.
+    fn tops(&self) -> [Top; 2] {
+        let top = |tlas: Option<&Tlas>| Top {
+            scene: tlas.map_or(gpu::NO_INDEX, Tlas::index),
+            ..Top::default()
+        };
+        [top(Some(&self.tlas)), top(self.models.as_ref())]
+    }
 }
 
 /// Builds the structures of each frame in persistent storage.
@@ -170,6 +195,8 @@ pub struct Accel {
     driver: Option<DriverStructures>,
     /// Bytes of our own structures of the last frame: bottom levels, top level.
     own_bytes: [u64; 2],
+    /// Makes a top level of the models alone, too.
+    has_models: bool,
 }
 
 impl Accel {
@@ -186,11 +213,23 @@ impl Accel {
                 slots: parts.slots.iter().map(blas).collect(),
                 tlas: Tlas::new(device, "trace scene"),
                 placed: None,
+                models: None,
             }),
             parts,
             shapes: Shapes::new(device, tracer),
             own_bytes: [0; 2],
+            has_models: false,
         }
+    }
+
+    /// Makes empty storage, which has a second top level of the models alone.
+    pub fn with_models(device: &Device, tracer: Tracer) -> Self {
+        let mut made = Self::new(device, tracer);
+        made.has_models = true;
+        if let Some(driver) = &mut made.driver {
+            driver.models = Some(Tlas::new(device, "trace models"));
+        }
+        made
     }
 
     /// Bytes of all structures but the map's.
@@ -258,6 +297,9 @@ impl Accel {
             let kept = Part::Kept(index, prepared);
             let place = (axes(instance), instance.origin);
             placements.add(kept, place, mask, part.kind, [record]);
+            if let Some(placed) = placements.placed.last_mut() {
+                placed.of_model = part.of_model;
+            }
         }
         for (index, slot) in self.parts.slots.iter().enumerate() {
             if slot.triangles.is_empty() {
@@ -276,9 +318,10 @@ impl Accel {
         let Placements { placed, records } = placements;
         output.geometries = rec.arena().push(&records)?;
         if self.driver.is_some() {
-            output.scene = self.build_driver(rec, geometry.map_or(0, |g| g.serial), &placed)?;
+            let serial = geometry.map_or(0, |g| g.serial);
+            [output.top, output.models] = self.build_driver(rec, serial, &placed)?;
         } else {
-            (output.nodes, output.placed) = self.build_own(rec, &placed)?;
+            [output.top, output.models] = self.build_own(rec, &placed)?;
         }
         Ok(output)
     }
@@ -292,16 +335,16 @@ impl Accel {
             || parts.into_iter().any(|p| solid(p.seen, p.kind))
     }
 
-    /// Builds the driver's bottom levels in one batch, then the top level; returns its bindless index. `serial`: that
-    /// of the map's geometry.
+    /// Builds the driver's bottom levels in one batch, then the top level and that of models. `serial`: that of the map's
+    /// geometry.
     fn build_driver(
         &mut self,
         rec: &mut Recorder,
         serial: u64,
         placed: &[Placement<'_>],
-    ) -> Result<u32, Error> {
+    ) -> Result<[Top; 2], Error> {
         let Some(driver) = &mut self.driver else {
-            return Ok(gpu::NO_INDEX);
+            return Ok(Default::default());
         };
         let positions = &self.parts.positions;
         let vertex_address = rec.arena().push(positions)?;
@@ -358,24 +401,29 @@ impl Accel {
         // equal instances over the same map: the last top level is still valid
         let same = |(of, built): &(u64, Vec<gpu::Instance>)| *of == serial && *built == instances;
         if rests && driver.placed.as_ref().is_some_and(same) {
-            return Ok(driver.tlas.index());
+            return Ok(driver.tops());
         }
         let mut pass = rec.pass("trace_scene", Access::ACCEL_BUILD, Access::ACCEL_BUILD)?;
         driver.placed = None;
         pass.build_tlas(&mut driver.tlas, &instances)?;
+        if let Some(models) = &mut driver.models {
+            let of_models = instances.iter().zip(placed).filter(|(_, p)| p.of_model);
+            let of_models: Vec<gpu::Instance> = of_models.map(|(instance, _)| *instance).collect();
+            pass.build_tlas(models, &of_models)?;
+        }
         driver.placed = Some((serial, instances));
-        Ok(driver.tlas.index())
+        Ok(driver.tops())
     }
 
-    /// Builds our own hierarchies of changing geometry and the top level; returns their addresses in the frame's
-    /// memory.
+    /// Builds our own hierarchies of changing geometry, the top level and that of models, in the frame's memory.
     fn build_own(
         &mut self,
         rec: &mut Recorder,
         placed: &[Placement<'_>],
-    ) -> Result<(u64, u64), Error> {
+    ) -> Result<[Top; 2], Error> {
         let mut instances = Vec::with_capacity(placed.len());
         let mut boxes = Vec::with_capacity(placed.len());
+        let mut of_models = Vec::new();
         let positions = &self.parts.positions;
         let position = |i: u32| positions.get(i as usize).copied().unwrap_or(Vec3::NAN);
         let mut changing = 0;
@@ -424,6 +472,9 @@ impl Accel {
                 _ => 0,
             };
             let inverse = p.axis.inverse();
+            if p.of_model {
+                of_models.push(boxes.len());
+            }
             boxes.push(Aabb::of(
                 own.bounds.corners().map(|c| p.axis * c + p.origin),
             ));
@@ -435,18 +486,47 @@ impl Accel {
                 mask: u32::from(p.mask) | structure,
             });
         }
-        let top = Hierarchy::new(&boxes, INSTANCES);
-        let ordered: Vec<BvhInstance> = (top.order().iter())
-            .filter_map(|&i| instances.get(i as usize).copied())
-            .collect();
-        let nodes = widen(&top);
-        let bytes = size_of_val(nodes.as_slice()) + size_of_val(ordered.as_slice());
-        self.own_bytes = [changing as u64, bytes as u64];
-        if nodes.is_empty() {
-            return Ok((0, 0));
+        let (top, bytes) = own_top(rec, &boxes, &instances)?;
+        self.own_bytes = [changing as u64, bytes];
+        let mut models = Top::default();
+        if self.has_models {
+            let boxes: Vec<Aabb> = pick(&boxes, &of_models);
+            let instances: Vec<BvhInstance> = pick(&instances, &of_models);
+            (models, _) = own_top(rec, &boxes, &instances)?;
         }
-        Ok((rec.arena().push(&nodes)?, rec.arena().push(&ordered)?))
+        Ok([top, models])
     }
+}
+
+/// The members of a list at these places.
+fn pick<T: Copy>(list: &[T], places: &[usize]) -> Vec<T> {
+    places
+        .iter()
+        .filter_map(|&i| list.get(i).copied())
+        .collect()
+}
+
+/// A top level of ours in the frame's memory, and its bytes.
+fn own_top(
+    rec: &mut Recorder,
+    boxes: &[Aabb],
+    instances: &[BvhInstance],
+) -> Result<(Top, u64), Error> {
+    let top = Hierarchy::new(boxes, INSTANCES);
+    let ordered: Vec<BvhInstance> = (top.order().iter())
+        .filter_map(|&i| instances.get(i as usize).copied())
+        .collect();
+    let nodes = widen(&top);
+    let bytes = size_of_val(nodes.as_slice()) + size_of_val(ordered.as_slice());
+    if nodes.is_empty() {
+        return Ok((Top::default(), bytes as u64));
+    }
+    let top = Top {
+        nodes: rec.arena().push(&nodes)?,
+        placed: rec.arena().push(&ordered)?,
+        ..Top::default()
+    };
+    Ok((top, bytes as u64))
 }
 
 /// Rows of an instance's transform.

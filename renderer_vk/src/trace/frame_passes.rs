@@ -154,7 +154,11 @@ impl<'a> FramePasses<'a> {
         self.written.add(&[resource]);
     }
 
-    fn record<T: bytemuck::Pod>(&mut self, pass: Pass, push: &T) -> Result<(), Error> {
+    /// Records a pass with its push constants.
+    ///
+    /// # Errors
+    /// Out of memory, or the driver refuses the pipeline.
+    pub fn record<T: bytemuck::Pod>(&mut self, pass: Pass, push: &T) -> Result<(), Error> {
         let row = pass.row();
         if cfg!(debug_assertions) {
             let missing = self.written.first_missing(row.reads);

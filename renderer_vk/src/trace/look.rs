@@ -82,7 +82,7 @@ impl MaterialTable for Assets {
 
 /// A number that changes when a material is remapped, when files of materials change its `MATERIAL_*` bits, or when the
 /// height of a sky's clouds changes.
-fn remapping(materials: &Materials) -> u64 {
+pub(super) fn remapping(materials: &Materials) -> u64 {
     let mut hasher = DefaultHasher::new();
     materials.cloud_height().to_bits().hash(&mut hasher);
     for material in materials.iter() {
@@ -97,7 +97,7 @@ fn remapping(materials: &Materials) -> u64 {
 }
 
 /// The map's geometry of constant shape.
-fn static_scene<'a>(world: &'a World, fogs: &'a [Fog]) -> StaticScene<'a> {
+pub(super) fn static_scene<'a>(world: &'a World, fogs: &'a [Fog]) -> StaticScene<'a> {
     let data = &world.data;
     let surfaces = data
         .surfaces

@@ -27,6 +27,7 @@ mod frame_lights;
 pub mod frame_passes;
 pub mod geometry;
 mod grid;
+pub mod hybrid;
 mod indirect;
 pub mod input;
 pub mod layer_boxes;

@@ -148,6 +148,8 @@ pub struct Part {
     pub vertices: Range<usize>,
     /// Its members in [`Parts::shapes`], [`Parts::skins`] and [`Parts::meshes`].
     pub members: Range<usize>,
+    /// It belongs to a model, not to the map.
+    pub of_model: bool,
     /// Drawing order of its first mesh.
     order: usize,
 }
@@ -464,6 +466,7 @@ impl Parts {
                 animated: key.animated,
                 vertices: base..base.saturating_add(end as usize),
                 members: first..self.meshes.len(),
+                of_model: key.world_surface == u32::MAX,
                 order,
             });
         }

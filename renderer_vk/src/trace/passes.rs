@@ -142,6 +142,12 @@ pub enum Resource {
     Bloom,
     /// The view's rectangle of the frame's image.
     Target,
+    /// Hybrid look: normals and depths of the map's surfaces; drawn before the passes.
+    HybridSurfaces,
+    /// Hybrid look: occlusion by models, and hidden dynamic lights.
+    HybridTraced,
+    /// The same, filtered; read by the draws of the map.
+    HybridTexels,
 }
 
 impl Resource {
@@ -496,6 +502,16 @@ passes! {
         reads: &[GBuffer, Picture],
         may_read: &[Positions, Normals, Shown, Other, Gradients, DirectLight, IndirectLight, Past],
         writes: &[Target],
+    }
+    /// Hybrid look (`r_rt 2`): rays from the map's surfaces to models, and to dynamic lights.
+    HybridShadows = "hybrid_shadows", Rays(&shaders::TRACE_HYBRID_SHADOWS), Traced {
+        reads: &[Scene, HybridSurfaces],
+        writes: &[HybridTraced],
+    }
+    /// Hybrid look: mean over the directions of the rays to models.
+    HybridFilter = "hybrid_filter", Compute(&shaders::TRACE_HYBRID_FILTER_COMP), Traced {
+        reads: &[HybridTraced],
+        writes: &[HybridTexels],
     }
 }
 

@@ -60,6 +60,15 @@ pub const MASK_THIRD_SOLID: u8 = 0x20;
 pub const MASK_THIRD_TRANSLUCENT: u8 = 0x40;
 pub const MASK_NO_SHADOW: u8 = 0x80;
 
+/// Rays to models from a texel of the hybrid look.
+pub const HYBRID_RAYS: u32 = 2;
+/// Length of these rays, units: a player at the end of one occludes less than 2 % of the floor's hemisphere.
+pub const HYBRID_REACH: u32 = 128;
+/// Models within this distance of a dynamic light do not hide it, units: half the height of a player.
+pub const HYBRID_CLEARANCE: u32 = 32;
+/// A dynamic light that lies deeper behind a surface does not light it, units.
+pub const HYBRID_SINK: u32 = 4;
+
 /// Bits of `TriangleLight::flags`.
 pub const LIGHT_TWO_SIDED: u32 = 1;
 /// A triangle of the map that rays of bounces can hit, with constant radiance.

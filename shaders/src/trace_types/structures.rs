@@ -45,6 +45,22 @@ pub struct PassStep {
     pub part: u32,
 }
 
+/// Push constants of a pass of the hybrid look.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct HybridStep {
+    /// The `TraceView`.
+    pub view: u64,
+    /// The same with the models alone in its top level.
+    pub models: u64,
+    /// The [`HybridView`](crate::types::HybridView).
+    pub hybrid: u64,
+    /// Number of the filter's step.
+    pub number: u32,
+    /// Makes the size a multiple of 8 bytes.
+    pub padding: u32,
+}
+
 /// A node of a bounding volume hierarchy: boxes of up to four children, quantized to a grid of the node (after Ylitie,
 /// Karras and Laine, Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs, HPG 2017).
 #[repr(C)]

@@ -15,7 +15,7 @@ use crate::gpu::ColorMask;
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
 use crate::raster::FlareTest;
 use crate::scene::{GatherInput, Scene};
-use crate::settings::{Settings, TracerChoice};
+use crate::settings::{Look, Settings, TracerChoice};
 use crate::test_support::openarena;
 use crate::trace::ahead::compile_ahead;
 use crate::trace::pass_set::PassSet;
@@ -158,7 +158,7 @@ fn maps_are_lit() {
             .collect(),
     };
     let settings = Settings {
-        rt: true,
+        rt: Look::Traced,
         rt_accumulate: std::env::var_os("RELIGHT_TRACE_LIVE").is_none(),
         ..Settings::full_size()
     };
@@ -216,7 +216,7 @@ fn tracers_agree_on_maps() {
             TracerChoice::Grid,
         ] {
             let settings = Settings {
-                rt: true,
+                rt: Look::Traced,
                 rt_accumulate: true,
                 rt_bounces: 1,
                 rt_auto_exposure: false,

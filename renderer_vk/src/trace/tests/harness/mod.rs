@@ -9,7 +9,7 @@ use shaders::types::Instance;
 
 use crate::half::half;
 use crate::scene::Portal;
-use crate::settings::Settings;
+use crate::settings::{Look, Settings};
 
 pub use gpu::Gpu;
 pub(crate) use gpu::gpu_tests;
@@ -19,7 +19,7 @@ pub use scene::Scene;
 /// Settings of a reference picture without bounced light.
 pub fn reference() -> Settings {
     Settings {
-        rt: true,
+        rt: Look::Traced,
         rt_accumulate: true,
         rt_bounces: 0,
         rt_auto_exposure: false,
