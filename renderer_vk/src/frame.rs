@@ -8,11 +8,12 @@ use crate::assets::Assets;
 use crate::gpu::{self, ColorMask, Image, Recorder};
 use crate::raster::{
     Aids, DrawList, FlareTest, Flares, HybridSurfaces, Overlay, PixelLights, Raster, StageContext,
-    Statics, SurfaceMapping, Target, UiMeshes, ViewParameters, overlay_instance, window_to_clip,
+    Statics, SurfaceMapping, Target, UiMeshes, ViewParameters, overlay_instance, reflects,
+    window_to_clip,
 };
 use crate::scene::{ClassicScene, TracedScene, ViewScene};
 use crate::settings::Settings;
-use crate::trace::hybrid::{HybridLook, HybridScene};
+use crate::trace::hybrid::{HybridInput, HybridLook, HybridScene};
 use crate::trace::{MapView, TraceLook};
 use crate::world::World;
 
@@ -270,10 +271,17 @@ impl<'a> FrameContext<'a> {
         };
         let target = self.target();
         let mut uploaded = self.raster.upload(recorder, self.list, &parameters)?;
-        if let (Some(traced), Some(look)) = (traced, self.hybrid.as_deref_mut()) {
-            let images = look.images([self.drawn.width(), self.drawn.height()])?;
+        if let (Some(met), Some(look)) = (traced, self.hybrid.as_deref_mut()) {
+            let mirrors = self.list.calls.iter().any(reflects);
+            let images = look.images([self.drawn.width(), self.drawn.height()], mirrors)?;
             (self.hybrid_surfaces).record(recorder, images, self.list, &parameters, &uploaded)?;
-            uploaded.hybrid = look.trace(recorder, traced, scene, &parameters, self.assets)?;
+            let view = HybridInput {
+                met,
+                scene,
+                parameters: &parameters,
+                mirrors,
+            };
+            uploaded.hybrid = look.trace(recorder, view, self.assets)?;
         }
         self.raster.record_uploaded(
             recorder,

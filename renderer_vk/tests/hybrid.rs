@@ -23,9 +23,20 @@ const REACH: f32 = 128.0;
 
 const SCRIPT: &[u8] = b"
 t/lit { { map $lightmap } }
+t/mirror { { map $lightmap }
+  { map t/env.tga
+    tcGen environment
+    blendFunc add } }
 t/body { { map $whiteimage
   rgbGen const ( 0.25 0.25 0.25 ) } }
 ";
+
+/// Height of a reflecting floor over the other one.
+const HEIGHT: f32 = 1.0;
+/// Value of the lightmap of a reflecting floor.
+const DARK: u8 = 20;
+/// Value of the model.
+const BODY: f32 = 63.0;
 
 /// A room with a lightmapped floor at 0, and a wall across it that reaches from x = 60 to x = 64.
 struct Stage {
@@ -36,6 +47,11 @@ struct Stage {
 
 impl Stage {
     fn new(tracer: TracerChoice) -> Option<Self> {
+        Self::with(tracer, false)
+    }
+
+    /// `mirror`: the floor reflects.
+    fn with(tracer: TracerChoice, mirror: bool) -> Option<Self> {
         let options = RendererOptions {
             validation: true,
             ..RendererOptions::headless(SIDE as u32, SIDE as u32)
@@ -59,7 +75,19 @@ impl Stage {
         for surface in 0..12 {
             map.set_lightmap(surface, page);
         }
+        if mirror {
+            let mirror = map.add_shader("t/mirror", 0, 0);
+            let corners = [(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0)];
+            let floor = map.add_quad(mirror, corners.map(|(x, y)| Vec3::new(x, y, 0.0) * 256.0));
+            for vertex in map.vertices_mut(floor) {
+                vertex.position.z = HEIGHT;
+                vertex.normal = Vec3::Z;
+            }
+            let dark = map.add_lightmap([DARK; 3]);
+            map.set_lightmap(floor, dark);
+        }
         let mut files = MemoryFiles::new();
+        files.insert("t/env.tga", white()).unwrap();
         files.insert("scripts/t.shader", SCRIPT).unwrap();
         files.insert("maps/t.bsp", map.build().write()).unwrap();
         files.insert("m/box.md3", box_model()).unwrap();
@@ -111,6 +139,13 @@ impl Drop for Stage {
             assert!(messages.is_empty(), "validation: {messages:#?}");
         }
     }
+}
+
+/// An uncompressed TGA image of one white pixel.
+fn white() -> Vec<u8> {
+    let mut tga = vec![0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 32, 8];
+    tga.extend([255; 4]);
+    tga
 }
 
 /// A cube around its origin.
@@ -333,5 +368,65 @@ fn a_light_behind_a_wall_does_not_shine_through_it() {
             none += u32::from(open.rgb[i] > dark.rgb[i] && shadowed.rgb[i] == without.rgb[i]);
         }
         assert!(whole > 1000 && none > 300, "{whole} {none}");
+    }
+}
+
+fn check_reflection(tracer: TracerChoice) {
+    let Some(mut stage) = Stage::with(tracer, true) else {
+        return;
+    };
+    let model = Vec3::new(-20.0, 0.0, 36.0);
+    let classic = stage.picture(Look::Classic, &[model], &[]);
+    let shown = stage.picture(Look::Hybrid, &[model], &[]);
+    let camera = def().view_origin;
+    let point = |direction: Vec3| camera - direction * ((camera.z - HEIGHT) / direction.z);
+    let mirrors = |direction: Vec3| {
+        enters(
+            point(direction),
+            direction * Vec3::new(1.0, 1.0, -1.0),
+            model,
+        )
+        .is_some()
+    };
+    let (mut boxes, mut walls) = (0, 0);
+    for y in 0..SIDE {
+        for x in 0..SIDE {
+            let around = [-3.0, 0.0, 3.0]
+                .map(|dx| [-3.0, 0.0, 3.0].map(|dy| ray(x as f32 + dx, y as f32 + dy)));
+            let around = around.as_flattened();
+            let floor = |d: &Vec3| d.z < 0.0 && point(*d).x < 50.0;
+            let in_front = |d: &Vec3| enters(camera, *d, model).is_some();
+            if !around.iter().all(floor) || around.iter().any(in_front) {
+                continue;
+            }
+            // the environment image is white
+            assert_eq!(red(&classic, x, y), 255.0);
+            let direction = ray(x as f32, y as f32);
+            let mirrored = mirrors(direction);
+            if around.iter().any(|d| mirrors(*d) != mirrored) {
+                continue;
+            }
+            let baked = f32::from(DARK) * (1.0 - occlusion(point(direction), model));
+            let wanted = baked + if mirrored { BODY } else { f32::from(BAKED) };
+            let error = red(&shown, x, y) - wanted;
+            assert!(error.abs() < 4.0, "{x} {y} {mirrored}: {error}");
+            if mirrored {
+                boxes += 1;
+            } else {
+                walls += 1;
+            }
+        }
+    }
+    assert!(boxes > 200 && walls > 5000, "{boxes} {walls}");
+}
+
+#[test]
+fn an_environment_image_on_the_floor_shows_the_scene() {
+    for tracer in [
+        TracerChoice::Auto,
+        TracerChoice::Query,
+        TracerChoice::Pipeline,
+    ] {
+        check_reflection(tracer);
     }
 }

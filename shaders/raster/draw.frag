@@ -29,7 +29,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Counter { ui
 
 #ifdef HYBRID
 #include "raster/hybrid.glsl"
-float shadow = 0.0; // part of the light that rays found missing
+float shadow = 0.0;          // part of the light that rays found missing
+vec4 reflection = vec4(0.0); // see `hybrid_reflection`
 #endif
 
 // The indices are dynamically uniform within a draw and need no `nonuniformEXT`.
@@ -41,6 +42,13 @@ vec4 sample_stage(uint stage) {
     uint handle = in_textures[stage];
 #endif
     vec2 uv = (stage & 1) == 0 ? in_uv[stage / 2].xy : in_uv[stage / 2].zw;
+#ifdef HYBRID
+    if ((MIRRORED >> stage & 1) != 0 && reflection.a > 0.0) {
+        vec4 image = texture(sampler2D(textures[handle & 0xFFFFFF], samplers[handle >> 24]), uv);
+        vec4 mean = textureLod(sampler2D(textures[handle & 0xFFFFFF], samplers[handle >> 24]), vec2(0.5), 32.0);
+        return vec4(in_place_of(mean.rgb, reflection.rgb), image.a);
+    }
+#endif
     return texture(sampler2D(textures[handle & 0xFFFFFF], samplers[handle >> 24]), uv);
 }
 
@@ -138,8 +146,10 @@ vec3 pixel_light() {
 
 void main() {
 #ifdef HYBRID
+    HybridPlaces places = hybrid_places();
     bool dynamic = (SHADOWED & 16u) != 0;
-    shadow = hybrid_shadow(dynamic, dynamic ? Draws(VIEW.draws).at[in_textures.x].light : 0);
+    if (SHADOWED != 0) shadow = hybrid_shadow(places, dynamic, dynamic ? Draws(VIEW.draws).at[in_textures.x].light : 0);
+    if (MIRRORED != 0) reflection = hybrid_reflection(places);
 #endif
     if (CLIP != 0 && in_clip < 0.0) discard;
     if (MODE == DRAW_LIGHT) {

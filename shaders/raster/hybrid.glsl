@@ -4,33 +4,74 @@
 
 layout(constant_id = 14) const uint SHADOWED = 0; // bit i: models shadow the light of stage i; bit 4: of a dynamic light
 
+layout(constant_id = 15) const uint MIRRORED = 0; // bit i: the environment image of stage i shows the scene
+
 // Relative difference of depth from the plane.
 const float SAME_PLANE = 0.01;
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer HybridViews { HybridView view; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer HybridTexels { HybridTexel at[]; };
 
-// Parts of the light of models' surroundings and of dynamic light `light` that are missing. Exactly 0 where all texels are.
-float hybrid_shadow(bool dynamic, uint light) {
-    float here = gl_FragCoord.w;
-    vec2 slope = vec2(dFdx(here), dFdy(here));
-    HybridViews views = HybridViews(push.hybrid);
-    HybridTexels texels = HybridTexels(views.view.texels);
-    ivec2 last = ivec2(views.view.width, views.view.height) - 1;
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer HybridReflections { HybridReflection at[]; };
+
+// The four nearest texels, with their weights if they lie in the fragment's plane.
+struct HybridPlaces {
+    ivec2 corner;
+    vec2 share;
+    ivec2 last;
+    float here;
+    vec2 slope;
+};
+
+HybridPlaces hybrid_places() {
+    HybridPlaces p;
+    p.here = gl_FragCoord.w;
+    p.slope = vec2(dFdx(p.here), dFdy(p.here));
     vec2 at = gl_FragCoord.xy * 0.5 - 0.5;
-    vec2 corner = floor(at), share = at - corner;
+    p.corner = ivec2(floor(at));
+    p.share = at - floor(at);
+    HybridViews views = HybridViews(push.hybrid);
+    p.last = ivec2(views.view.width, views.view.height) - 1;
+    return p;
+}
+
+ivec2 hybrid_place(HybridPlaces p, int i) { return clamp(p.corner + ivec2(i & 1, i >> 1), ivec2(0), p.last); }
+
+uint hybrid_index(HybridPlaces p, ivec2 place) { return uint(place.y * (p.last.x + 1) + place.x); }
+
+float hybrid_weight(HybridPlaces p, int i, float inverse_depth) {
+    vec2 moved = (vec2(hybrid_place(p, i)) + 0.5) * 2.0 - gl_FragCoord.xy;
+    if (abs(inverse_depth - (p.here + dot(p.slope, moved))) > SAME_PLANE * p.here) return 0.0;
+    vec2 side = mix(1.0 - p.share, p.share, vec2(i & 1, i >> 1));
+    return side.x * side.y + 1.0e-4;
+}
+
+// The part of the light of models' surroundings, or of dynamic light `light`, that is missing. Exactly 0 where all texels are.
+float hybrid_shadow(HybridPlaces p, bool dynamic, uint light) {
+    HybridTexels texels = HybridTexels(HybridViews(push.hybrid).view.texels);
     float sum = 0.0, weights = 0.0;
     for (int i = 0; i < 4; i++) {
-        ivec2 offset = ivec2(i & 1, i >> 1);
-        ivec2 place = clamp(ivec2(corner) + offset, ivec2(0), last);
-        HybridTexel texel = texels.at[place.y * int(views.view.width) + place.x];
-        vec2 moved = (vec2(place) + 0.5) * 2.0 - gl_FragCoord.xy;
-        float expected = here + dot(slope, moved);
-        if (abs(texel.inverse_depth - expected) > SAME_PLANE * here) continue;
-        vec2 side = mix(1.0 - share, share, vec2(offset));
-        float weight = side.x * side.y + 1.0e-4;
+        HybridTexel texel = texels.at[hybrid_index(p, hybrid_place(p, i))];
+        float weight = hybrid_weight(p, i, texel.inverse_depth);
         sum += weight * (dynamic ? float(texel.hidden >> light & 1u) : texel.occlusion);
         weights += weight;
     }
     return weights > 0.0 ? sum / weights : 0.0;
 }
+
+// The mirrored scene as displayed, and 1 if it is known.
+vec4 hybrid_reflection(HybridPlaces p) {
+    HybridReflections reflections = HybridReflections(HybridViews(push.hybrid).view.reflections);
+    vec4 sum = vec4(0.0);
+    for (int i = 0; i < 4; i++) {
+        HybridReflection texel = reflections.at[hybrid_index(p, hybrid_place(p, i))];
+        sum += hybrid_weight(p, i, texel.inverse_depth) * vec4(unpackUnorm4x8(texel.color).rgb, 1.0);
+    }
+    return sum.a > 0.0 ? sum / sum.a : sum;
+}
+
+// An environment image shows surroundings of about this displayed brightness; a brighter mean is a tint.
+const float USUAL_BRIGHTNESS = 1.0 / 3.0;
+
+// The scene in place of an environment image whose mean is `mean`.
+vec3 in_place_of(vec3 mean, vec3 scene) { return scene * min(mean / USUAL_BRIGHTNESS, 1.0); }

@@ -359,6 +359,16 @@ pub struct HybridTexel {
     pub normal: u32,
 }
 
+/// The mirrored scene in a pixel of half the picture's size, in the hybrid look.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct HybridReflection {
+    /// 1 over the depth `w` of the reflecting surface; 0: there is none.
+    pub inverse_depth: f32,
+    /// Colour as displayed, four 8-bit unsigned normalized values.
+    pub color: u32,
+}
+
 /// A view of the hybrid look: input of its rays, and their results as draws read them.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -367,12 +377,18 @@ pub struct HybridView {
     pub texels: u64,
     /// The same between the steps of the filter.
     pub between: u64,
+    /// [`HybridReflection`]s; 0: no surface in sight reflects.
+    pub reflections: u64,
     /// [`RasterLight`]s of the view.
     pub lights: u64,
     /// Number of lights, at most 32.
     pub light_count: u32,
     /// Storage image of the surfaces of the map, RGBA32F: octahedral normal, 0, 1 over `w`.
     pub surfaces: u32,
+    /// The same of the nearest reflecting surfaces; the third value is 1 of first-person models.
+    pub mirrors: u32,
+    /// See [`RasterView::identity_light`].
+    pub identity_light: f32,
     /// Texels in a row.
     pub width: u32,
     /// Rows.

@@ -7,7 +7,11 @@
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer HybridViews { HybridView view; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer HybridTexels { HybridTexel at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer HybridReflections { HybridReflection at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer RasterLights { RasterLight at[]; };
+
+// Rays between surfaces, but for the first-person weapon.
+const uint MASK_MODELS = MASK_SOLID | MASK_THIRD_SOLID;
 
 #define HYBRID_VIEW (HybridViews(push.hybrid).view)
 

@@ -308,6 +308,9 @@ impl DrawList {
         let lightmap = group.common.lightmap;
         let (mut shading, mut draw) =
             stages.passes(material, passes, instance, lightmap, fog_adjust, draw);
+        if stages.traced_shadows && group.range != DepthRange::Crosshair {
+            shading.mirrored = hybrid::mirroring_stages(stages.materials, &shading, &draw);
+        }
         if group.is_of_map() && stages.traced_shadows {
             shading.shadowed = hybrid::lit_stages(stages.materials, &shading, &draw, lightmap);
         }

@@ -8,10 +8,10 @@ use shaders::types::constants as c;
 use shaders::types::{Draw, HybridView};
 use support::slice;
 
-use super::list::{DepthRange, DrawList};
+use super::list::{Call, DepthRange, DrawList};
 use super::pipelines::CullFaces;
 use super::shading::Shading;
-use super::{EDGE_SHIFT, Uploaded, ViewParameters};
+use super::{EDGE_SHIFT, Uploaded, ViewParameters, viewport};
 use crate::assets::Materials;
 use crate::gpu::{
     self, Cull, Device, Format, GraphicsDesc, GraphicsPipeline, Image, ImageDesc, ImageUsage,
@@ -30,10 +30,9 @@ pub(super) fn lit_stages(
     lightmap: u32,
 ) -> u32 {
     let stages = &materials.arrays().stages;
-    let drawn = |place: usize| place == 0 || shading.combines(place);
     let is_lit = |place: &usize| {
         let stage = slice::get(stages, draw.stages[*place] as usize);
-        drawn(*place)
+        shading.draws(*place)
             && stage.is_some_and(|stage| match lightmap {
                 c::NO_TEXTURE => {
                     [c::RGBGEN_VERTEX, c::RGBGEN_EXACT_VERTEX].contains(&stage.rgb_gen)
@@ -46,19 +45,39 @@ pub(super) fn lit_stages(
         .fold(0, |bits, place| bits | 1 << place)
 }
 
+/// [`Shading::mirrored`] of a draw: its stages whose environment image stands for a reflection.
+pub(super) fn mirroring_stages(materials: &Materials, shading: &Shading, draw: &Draw) -> u32 {
+    let stages = &materials.arrays().stages;
+    let mirrors = |place: &usize| {
+        let stage = slice::get(stages, draw.stages[*place] as usize);
+        shading.draws(*place)
+            && shading.shows_environment(*place)
+            && stage.is_some_and(|stage| stage.flags & c::STAGE_REFLECTION != 0)
+    };
+    (0..draw.stages.len())
+        .filter(mirrors)
+        .fold(0, |bits, place| bits | 1 << place)
+}
+
 /// Images of the surfaces, half the size of the picture.
 pub struct HybridImages {
     /// Normals and depths (`hybrid_surface.frag`).
     pub surfaces: Image,
+    /// The same of the nearest reflecting surfaces, if there are any.
+    pub mirrors: Option<Image>,
     depth: Image,
 }
 
 impl HybridImages {
-    /// Images for a picture of a size in pixels.
+    /// Images for a picture of a size in pixels. `mirrors`: some surfaces reflect.
     ///
     /// # Errors
     /// The device is out of memory.
-    pub fn new(device: &Device, width: u32, height: u32) -> Result<Self, gpu::Error> {
+    pub fn new(
+        device: &Device,
+        [width, height]: [u32; 2],
+        mirrors: bool,
+    ) -> Result<Self, gpu::Error> {
         let (width, height) = (width.div_ceil(2), height.div_ceil(2));
         let image = |name, format, usage| {
             Image::new(device, &ImageDesc::new(name, width, height, format, usage))
@@ -66,6 +85,10 @@ impl HybridImages {
         let usage = ImageUsage::COLOR | ImageUsage::STORAGE;
         Ok(Self {
             surfaces: image("hybrid surfaces", Format::Rgba32F, usage)?,
+            mirrors: match mirrors {
+                true => Some(image("hybrid mirrors", Format::Rgba32F, usage)?),
+                false => None,
+            },
             depth: image(
                 "hybrid depth",
                 device.depth_format(false),
@@ -91,6 +114,8 @@ impl HybridImages {
         let corner = ray(0.0, 0.0);
         HybridView {
             surfaces: self.surfaces.storage_index(),
+            mirrors: self.mirrors.as_ref().map_or(0, Image::storage_index),
+            identity_light: p.identity_light,
             width: self.surfaces.width(),
             height: self.surfaces.height(),
             eye: eye.as_vec3(),
@@ -102,11 +127,29 @@ impl HybridImages {
     }
 }
 
-/// Draws the map's surfaces of a list to [`HybridImages`].
+/// Draws surfaces of a list to [`HybridImages`].
 pub struct HybridSurfaces {
     device: Device,
-    /// By culling, and whether the view has a clip plane.
-    pipelines: HashMap<(CullFaces, bool), GraphicsPipeline>,
+    pipelines: HashMap<Key, GraphicsPipeline>,
+}
+
+/// What the pipelines of surfaces differ in.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+struct Key {
+    cull: CullFaces,
+    /// The view has a clip plane.
+    clip: bool,
+    /// For [`HybridImages::mirrors`].
+    mirror: bool,
+}
+
+/// Whether a call draws a surface of the map that stops rays.
+fn is_surface(list: &DrawList, call: &Call) -> bool {
+    let draw = slice::get(&list.draws, call.draw as usize);
+    let stage = call.state.shading.mode == c::DRAW_STAGE && !call.state.wireframe;
+    let solid = call.state.blend.is_none() && call.state.depth_write;
+    let of_map = draw.is_some_and(|draw| draw.dynamic_vertices == 0);
+    stage && solid && of_map && call.range == DepthRange::Normal
 }
 
 impl HybridSurfaces {
@@ -130,48 +173,70 @@ impl HybridSurfaces {
         p: &ViewParameters<'_>,
         uploaded: &Uploaded,
     ) -> Result<(), gpu::Error> {
-        let clip = p.clip_plane != [0.0; 4];
-        let shows = |call: &&super::list::Call| {
-            let own = slice::get(&list.draws, call.draw as usize);
-            let stage = call.state.shading.mode == c::DRAW_STAGE && !call.state.wireframe;
-            let solid = call.state.blend.is_none() && call.state.depth_write;
-            let of_map = own.is_some_and(|draw| draw.dynamic_vertices == 0);
-            stage && solid && of_map && call.range == DepthRange::Normal
+        let surfaces = |call: &Call| is_surface(list, call);
+        self.draw(recorder, images, None, list, (p, uploaded), surfaces)?;
+        let mirrors = images.mirrors.as_ref();
+        let Some(mirrors) = mirrors.filter(|_| list.calls.iter().any(reflects)) else {
+            return Ok(());
         };
-        for call in list.calls.iter().filter(shows) {
-            let key = (call.state.cull, clip);
+        self.draw(
+            recorder,
+            images,
+            Some(mirrors),
+            list,
+            (p, uploaded),
+            reflects,
+        )
+    }
+
+    /// Draws the calls that `shows` selects: to the surfaces, or over their depth to `mirrors`.
+    fn draw(
+        &mut self,
+        recorder: &mut Recorder,
+        images: &HybridImages,
+        mirrors: Option<&Image>,
+        list: &DrawList,
+        (p, uploaded): (&ViewParameters<'_>, &Uploaded),
+        shows: impl Fn(&Call) -> bool,
+    ) -> Result<(), gpu::Error> {
+        let key = |call: &Call| Key {
+            cull: call.state.cull,
+            clip: p.clip_plane != [0.0; 4],
+            mirror: mirrors.is_some(),
+        };
+        for call in list.calls.iter().filter(|call| shows(call)) {
+            let key = key(call);
             if !self.pipelines.contains_key(&key) {
                 let made = pipeline(&self.device, images, key)?;
                 self.pipelines.insert(key, made);
             }
         }
         let rendering = Rendering {
-            color: Some(&images.surfaces),
+            color: Some(mirrors.unwrap_or(&images.surfaces)),
             depth: Some(&images.depth),
             clear_color: Some([0.0; 4]),
-            clear_depth: Some(1.0),
+            clear_depth: mirrors.is_none().then_some(1.0),
         };
         let mut pass = recorder.drawing("hybrid surfaces", &rendering)?;
-        let [x, y, width, height] = p.viewport.map(|v| v as f32 * 0.5);
-        pass.set_viewport(&Viewport {
-            x,
-            y: y + EDGE_SHIFT * 0.5,
-            width,
-            height,
-            min_depth: 0.0,
-            max_depth: 1.0,
-        });
         pass.bind_index_buffer(&uploaded.index_buffer, uploaded.index_offset);
-        let mut bound = None;
-        for call in list.calls.iter().filter(shows) {
-            let key = (call.state.cull, clip);
+        let (mut bound, mut range, mut pushed) = (None, None, 0);
+        for call in list.calls.iter().filter(|call| shows(call)) {
+            let key = key(call);
             if bound != Some(key) {
                 let Some(pipeline) = self.pipelines.get(&key) else {
                     continue;
                 };
                 pass.bind_graphics(pipeline);
-                pass.push(&[uploaded.views.all, 0]);
                 bound = Some(key);
+            }
+            if range != Some(call.range) {
+                pass.set_viewport(&half(viewport(call.range, p)));
+                range = Some(call.range);
+            }
+            let view = uploaded.views.of(call.range);
+            if pushed != view {
+                pass.push(&[view, 0]);
+                pushed = view;
             }
             pass.draw_indexed(call.index_count, 1, call.first_index, 0, call.draw);
         }
@@ -179,27 +244,50 @@ impl HybridSurfaces {
     }
 }
 
+/// Whether a call shows a reflection.
+pub fn reflects(call: &Call) -> bool {
+    call.state.shading.mirrored != 0
+}
+
+/// A viewport of a picture of half the size.
+fn half(v: Viewport) -> Viewport {
+    Viewport {
+        x: v.x * 0.5,
+        y: v.y * 0.5,
+        width: v.width * 0.5,
+        height: v.height * 0.5,
+        ..v
+    }
+}
+
 fn pipeline(
     device: &Device,
     images: &HybridImages,
-    (cull, clip): (CullFaces, bool),
+    key: Key,
 ) -> Result<GraphicsPipeline, gpu::Error> {
+    let (vertex, fragment) = if key.mirror {
+        (
+            &shaders::RASTER_HYBRID_SURFACE_VERT_MIRROR,
+            &shaders::RASTER_HYBRID_SURFACE_FRAG_MIRROR,
+        )
+    } else {
+        (
+            &shaders::RASTER_HYBRID_SURFACE_VERT,
+            &shaders::RASTER_HYBRID_SURFACE_FRAG,
+        )
+    };
     GraphicsPipeline::new(
         device,
         &GraphicsDesc {
             color: Some(images.surfaces.format()),
             depth: Some(images.depth.format()),
-            cull: match cull {
+            cull: match key.cull {
                 CullFaces::None => Cull::None,
                 CullFaces::Clockwise => Cull::Back,
                 CullFaces::CounterClockwise => Cull::Front,
             },
-            constants: &[(id::CLIP, clip.into())],
-            ..GraphicsDesc::new(
-                "hybrid surfaces",
-                &shaders::RASTER_HYBRID_SURFACE_VERT,
-                &shaders::RASTER_HYBRID_SURFACE_FRAG,
-            )
+            constants: &[(id::CLIP, key.clip.into())],
+            ..GraphicsDesc::new("hybrid surfaces", vertex, fragment)
         },
     )
 }

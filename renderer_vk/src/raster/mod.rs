@@ -33,7 +33,7 @@ use shaders::types::{Instance, MaterialBuffers, RasterLight, RasterView};
 pub use aids::{Aids, image_sheet};
 pub use expected::{ExpectedWorld, expected_instance};
 pub use flares::{FlareTest, Flares, window_to_clip};
-pub use hybrid::{HybridImages, HybridSurfaces};
+pub use hybrid::{HybridImages, HybridSurfaces, reflects};
 pub use list::{DrawList, Statics};
 pub use overlay::{Overlay, Picture2d, overlay_instance};
 pub use present::{Display, Present};
@@ -123,6 +123,16 @@ struct ViewAddresses {
     all: u64,
     /// For [`DepthRange::Near`].
     near: u64,
+}
+
+impl ViewAddresses {
+    /// Address for a depth range.
+    fn of(self, range: DepthRange) -> u64 {
+        match range {
+            DepthRange::Near => self.near,
+            _ => self.all,
+        }
+    }
 }
 
 /// Draws [`DrawList`]s.
@@ -394,15 +404,12 @@ impl Raster {
                 state = Some(call.state);
                 // Mesa's software driver drops fragment push constants after a pipeline that uses none
                 let shading = call.state.shading;
-                if overdraw != 0 || shading.mapping != 0 || shading.shadowed != 0 {
+                if overdraw != 0 || shading.mapping != 0 || shading.is_hybrid() {
                     pushed = 0;
                 }
             }
             // all pipelines share a layout, so push constants persist
-            let wanted = match call.range {
-                DepthRange::Near => views.near,
-                _ => views.all,
-            };
+            let wanted = views.of(call.range);
             if pushed != wanted {
                 pass.push(&[wanted, second]);
                 pushed = wanted;

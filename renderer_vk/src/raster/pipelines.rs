@@ -132,7 +132,7 @@ impl Pipelines {
         let several_inputs = state.shading.mode == c::DRAW_PIXEL_LIGHT;
         let many = state.shading.has_stages() || several_inputs || modified || target.counted;
         let mapped = state.shading.mapping != 0 && !target.counted;
-        let hybrid = state.shading.shadowed != 0 && !target.counted;
+        let hybrid = state.shading.is_hybrid() && !target.counted;
         let vertex = if depth_alone {
             &shaders::RASTER_DRAW_VERT_DEPTH
         } else if mapped {

@@ -33,6 +33,10 @@ impl PerStage {
         Self(value)
     }
 
+    fn at(self, stage: usize) -> u32 {
+        self.0 >> (Self::BITS * stage) & 0xF
+    }
+
     fn set(&mut self, stage: usize, value: u32) {
         let shift = Self::BITS * stage;
         self.0 = self.0 & !(0xF << shift) | value << shift;
@@ -73,10 +77,12 @@ pub struct Shading {
     pub mapping: u32,
     /// `SHADOWED` of `hybrid.glsl`; 0: none.
     pub shadowed: u32,
+    /// `MIRRORED` of `hybrid.glsl`; 0: none.
+    pub mirrored: u32,
 }
 
 /// Number of specialization constants.
-pub const CONSTANTS: usize = 15;
+pub const CONSTANTS: usize = 16;
 
 impl Shading {
     /// Uniformly white.
@@ -96,6 +102,7 @@ impl Shading {
         tc_gen: PerStage::NONE,
         mapping: 0,
         shadowed: 0,
+        mirrored: 0,
     };
 
     /// The spot of a dynamic light.
@@ -116,13 +123,23 @@ impl Shading {
     pub fn second_alone(mut self) -> Self {
         self.combine.set(1, c::COMBINE_REPLACE);
         self.mapping = 0;
-        self.shadowed = 0;
+        (self.shadowed, self.mirrored) = (0, 0);
         self
     }
 
-    /// Whether a later place of the draw has a stage.
-    pub(super) fn combines(&self, place: usize) -> bool {
-        self.combine.0 >> (PerStage::BITS * place) & 0xF != c::COMBINE_NONE
+    /// Whether a place of the draw has a stage.
+    pub(super) fn draws(&self, place: usize) -> bool {
+        place == 0 || self.combine.at(place) != c::COMBINE_NONE
+    }
+
+    /// Whether a place of the draw has the coordinates of an environment image.
+    pub(super) fn shows_environment(&self, place: usize) -> bool {
+        self.textures >> place & 1 != 0 && self.tc_gen.at(place) == c::TCGEN_ENVIRONMENT
+    }
+
+    /// Whether rays find a part of what the draw shows.
+    pub fn is_hybrid(&self) -> bool {
+        self.shadowed != 0 || self.mirrored != 0
     }
 
     /// Whether the draw has several stages.
@@ -148,6 +165,7 @@ impl Shading {
             (id::TC_GEN, self.tc_gen.0),
             (id::MAPPING, self.mapping),
             (hybrid::SHADOWED, self.shadowed),
+            (hybrid::MIRRORED, self.mirrored),
         ]
     }
 }

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use shaders::trace_types::{CameraView, HybridStep, SceneView, TraceView};
-use shaders::types::{HybridView, RasterLight};
+use shaders::types::{HybridReflection, HybridTexel, HybridView, RasterLight};
 
 use super::accel::{Accel, AccelOutput, Top};
 use super::frame_passes::{FrameFacts, FramePasses};
@@ -29,26 +29,36 @@ struct Targets {
     images: HybridImages,
     /// Texels, and texels between the steps of their filter.
     texels: [Buffer; 2],
+    /// Only with images of reflecting surfaces.
+    reflections: Option<Buffer>,
 }
 
 impl Targets {
-    fn new(device: &Device, [width, height]: [u32; 2]) -> Result<Self, Error> {
-        let images = HybridImages::new(device, width, height)?;
+    fn new(device: &Device, size: [u32; 2], mirrors: bool) -> Result<Self, Error> {
+        let images = HybridImages::new(device, size, mirrors)?;
         let count = u64::from(images.surfaces.width()) * u64::from(images.surfaces.height());
-        let buffer = |name| {
+        let buffer = |name, of_each: usize| {
             Buffer::new(
                 device,
                 &BufferDesc {
                     name,
-                    size: count * size_of::<shaders::types::HybridTexel>() as u64,
+                    size: count * of_each as u64,
                     usage: BufferUsage::STORAGE,
                     memory: Memory::Device,
                 },
             )
         };
+        let of_texel = size_of::<HybridTexel>();
         Ok(Self {
-            size: [width, height],
-            texels: [buffer("hybrid texels")?, buffer("hybrid texels between")?],
+            size,
+            texels: [
+                buffer("hybrid texels", of_texel)?,
+                buffer("hybrid texels between", of_texel)?,
+            ],
+            reflections: match mirrors {
+                true => Some(buffer("hybrid reflections", size_of::<HybridReflection>())?),
+                false => None,
+            },
             images,
         })
     }
@@ -71,6 +81,18 @@ pub struct HybridLook {
 pub struct HybridScene {
     accel: AccelOutput,
     time: f32,
+}
+
+/// A hybrid view whose surfaces are drawn.
+pub struct HybridInput<'a> {
+    /// What its rays meet.
+    pub met: HybridScene,
+    /// The view.
+    pub scene: &'a ClassicScene,
+    /// Parameters of its draws.
+    pub parameters: &'a ViewParameters<'a>,
+    /// Some surfaces of it reflect.
+    pub mirrors: bool,
 }
 
 impl HybridLook {
@@ -134,15 +156,17 @@ impl HybridLook {
         self.targets = None;
     }
 
-    /// The images of a picture of a size in pixels.
+    /// The images of a picture of a size in pixels. `mirrors`: some surfaces reflect.
     ///
     /// # Errors
     /// Out of memory.
-    pub fn images(&mut self, size: [u32; 2]) -> Result<&HybridImages, Error> {
-        let kept = self.targets.take().filter(|targets| targets.size == size);
+    pub fn images(&mut self, size: [u32; 2], mirrors: bool) -> Result<&HybridImages, Error> {
+        let kept = self.targets.take().filter(|targets| {
+            targets.size == size && (targets.images.mirrors.is_some() || !mirrors)
+        });
         let targets = match kept {
             Some(targets) => targets,
-            None => Targets::new(self.passes.device(), size)?,
+            None => Targets::new(self.passes.device(), size, mirrors)?,
         };
         Ok(&self.targets.insert(targets).images)
     }
@@ -155,20 +179,26 @@ impl HybridLook {
     pub fn trace(
         &mut self,
         rec: &mut Recorder,
-        scene: HybridScene,
-        view: &ClassicScene,
-        p: &ViewParameters<'_>,
+        input: HybridInput<'_>,
         assets: &Assets,
     ) -> Result<u64, Error> {
+        let HybridInput {
+            met: scene,
+            scene: view,
+            parameters: p,
+            mirrors,
+        } = input;
         let Some(targets) = &self.targets else {
             return Ok(0);
         };
         let lights = view.dlights.iter().take(MAX_LIGHTS);
         let lights: Vec<RasterLight> = lights.map(raster_light).collect();
         let [texels, between] = targets.texels.each_ref().map(Buffer::address);
+        let reflections = targets.reflections.as_ref().filter(|_| mirrors);
         let hybrid = HybridView {
             texels,
             between,
+            reflections: reflections.map_or(0, Buffer::address),
             lights: rec.arena().push(&lights)?,
             light_count: lights.len() as u32,
             ..targets.images.view(p)
@@ -207,6 +237,9 @@ impl HybridLook {
         let mut passes = FramePasses::new(&self.passes, rec, step.view, facts);
         passes.wrote(Resource::HybridSurfaces);
         passes.record(Pass::HybridShadows, &step)?;
+        if reflections.is_some() {
+            passes.record(Pass::HybridReflections, &step)?;
+        }
         for number in 0..2 {
             passes.record(Pass::HybridFilter, &HybridStep { number, ..step })?;
         }

@@ -148,6 +148,8 @@ pub enum Resource {
     HybridTraced,
     /// The same, filtered; read by the draws of the map.
     HybridTexels,
+    /// Hybrid look: the mirrored scene; read by the draws of environment images.
+    HybridReflections,
 }
 
 impl Resource {
@@ -507,6 +509,11 @@ passes! {
     HybridShadows = "hybrid_shadows", Rays(&shaders::TRACE_HYBRID_SHADOWS), Traced {
         reads: &[Scene, HybridSurfaces],
         writes: &[HybridTraced],
+    }
+    /// Hybrid look: what surfaces with an environment image mirror.
+    HybridReflections = "hybrid_reflections", Rays(&shaders::TRACE_HYBRID_REFLECTIONS), Traced {
+        reads: &[Scene, HybridSurfaces],
+        writes: &[HybridReflections],
     }
     /// Hybrid look: mean over the directions of the rays to models.
     HybridFilter = "hybrid_filter", Compute(&shaders::TRACE_HYBRID_FILTER_COMP), Traced {
