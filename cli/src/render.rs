@@ -217,7 +217,10 @@ impl RenderArgs {
         if self.devices.len() < 2 {
             return Ok(());
         }
-        if !settings.rt || !settings.rt_accumulate || settings.rt_debug != DebugOutput::None {
+        if settings.rt != renderer_vk::Look::Traced
+            || !settings.rt_accumulate
+            || settings.rt_debug != DebugOutput::None
+        {
             bail!(
                 "--devices share the mean picture of the traced look: it needs rt_accumulate 1 and rt_debug 0"
             );

@@ -16,6 +16,7 @@ mod list;
 mod overdraw;
 mod overlay;
 mod passes;
+mod per_stage;
 mod pipelines;
 mod present;
 mod shading;

@@ -9,6 +9,7 @@ use shaders::types::{DRAW_STAGES, Draw, Instance};
 use shaderscript::{AlphaGen, Cull, RgbGen, TcMod, WaveFunction, eval};
 use support::slice;
 
+use super::per_stage::PerStage;
 use super::surface_mapping::SurfaceMapping;
 use crate::assets::compile::sampler;
 use crate::assets::{Combine, Material, Materials, RasterPass, Samplers};
@@ -16,32 +17,6 @@ use crate::settings::Settings;
 
 /// Number of low bits of a handle in [`Draw::textures`] for the texture; the sampler is above.
 const TEXTURE_BITS: u32 = 24;
-
-/// A value below 16 for each stage of a draw, four bits each; the first stage has the lowest.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct PerStage(u32);
-
-impl PerStage {
-    /// Number of bits of a stage.
-    const BITS: usize = 4;
-
-    /// 0 for all stages.
-    const NONE: Self = Self(0);
-
-    /// `value` for the first stage, 0 for the others.
-    const fn first(value: u32) -> Self {
-        Self(value)
-    }
-
-    fn at(self, stage: usize) -> u32 {
-        self.0 >> (Self::BITS * stage) & 0xF
-    }
-
-    fn set(&mut self, stage: usize, value: u32) {
-        let shift = Self::BITS * stage;
-        self.0 = self.0 & !(0xF << shift) | value << shift;
-    }
-}
 
 /// Specialization of a draw's shaders. Every field is a specialization constant (`shaders/raster/draw.glsl`), so that a
 /// draw runs only the code it needs.
@@ -155,14 +130,14 @@ impl Shading {
             (id::CLIP, self.clip.into()),
             (id::TEXTURES, self.textures),
             (id::TC_MODS, self.tc_mods),
-            (id::COMBINE, self.combine.0),
-            (id::BLEND_SOURCE, self.blend_source.0),
-            (id::BLEND_TARGET, self.blend_target.0),
-            (id::ALPHA_FUNC, self.alpha_func.0),
-            (id::COLOR, self.color.0),
-            (id::RGB_GEN, self.rgb_gen.0),
-            (id::ALPHA_GEN, self.alpha_gen.0),
-            (id::TC_GEN, self.tc_gen.0),
+            (id::COMBINE, self.combine.bits()),
+            (id::BLEND_SOURCE, self.blend_source.bits()),
+            (id::BLEND_TARGET, self.blend_target.bits()),
+            (id::ALPHA_FUNC, self.alpha_func.bits()),
+            (id::COLOR, self.color.bits()),
+            (id::RGB_GEN, self.rgb_gen.bits()),
+            (id::ALPHA_GEN, self.alpha_gen.bits()),
+            (id::TC_GEN, self.tc_gen.bits()),
             (id::MAPPING, self.mapping),
             (hybrid::SHADOWED, self.shadowed),
             (hybrid::MIRRORED, self.mirrored),
