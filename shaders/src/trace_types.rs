@@ -15,7 +15,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::types::MaterialBuffers;
 
-pub use frames::{AntialiasView, DenoiseView, LastInstance, MotionView};
+pub use frames::{AntialiasView, DenoiseView, LastInstance, MotionView, ScreenView};
 pub use lights::{
     BspNode, DynamicRow, EmittedLight, LightBounds, LightRow, LightSlot, LightView, SphereLight,
     SunLight, TriangleLight,
@@ -62,6 +62,8 @@ pub struct TraceView {
     pub fog: FogView,
     /// Images of the traced size.
     pub images: ImageView,
+    /// Light of the last frame for bounces.
+    pub screen: ScreenView,
     /// Target of the finished picture.
     pub target: TargetView,
     /// Camera of this frame.

@@ -1,7 +1,7 @@
 #version 460
 // Shades the hits of `bounce_rays.rgen` and samples a light for each; `bounce_light.rgen` traces the shadow rays.
-#include "trace/bounce_ray.glsl"
 #include "trace/clock.glsl"
+#include "trace/screen.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -17,7 +17,7 @@ void main() {
     ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(cell, bounce_cells()))) return;
     ivec2 pixel = bounce_pixel(cell);
-    if (any(greaterThanEqual(pixel, ivec2(VIEW.width, VIEW.height))) || has_no_gloss(pixel)) return;
+    if (any(greaterThanEqual(pixel, ivec2(VIEW.width, VIEW.height))) || starts_nothing(cell, pixel)) return;
     LightTask task = bounce_task(pixel);
     BounceLight b = BounceLight(vec3(0.0), no_light(), vec3(0.0), true);
     PathVertex v = first_vertex(task);
@@ -38,7 +38,9 @@ void main() {
             gloss_write(pixel, gloss);
         }
         float most = is_specular() && push.number == 0 ? most_specular_light(gloss) : MOST_LIVE_LIGHT;
-        onward = hit.geometry != NO_HIT && bounce_shade(hit, origin, chain, most, throughput, b.found, v);
+        bool on_screen = SCREEN_HITS != 0 && hit.geometry == SCREEN_HIT;
+        if (on_screen) screen_shade(hit, origin, throughput, b.found);
+        onward = !on_screen && hit.geometry != NO_HIT && bounce_shade(hit, origin, chain, most, throughput, b.found, v);
         if (onward) {
             if (v.chain == CHAIN_NONE) {
                 b.light = vertex_light(v);

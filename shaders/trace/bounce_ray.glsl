@@ -42,8 +42,8 @@ bool gathers(LightTask task, out GlossPixel gloss) {
     return is_glossy(gloss.gloss);
 }
 
-// Whether no specular path starts at the pixel. Nothing reads what these passes would write for it.
-bool has_no_gloss(ivec2 pixel) { return is_specular() && !is_glossy(gloss_read(pixel).gloss); }
+// Whether no path starts at the pixel of a cell. Nothing reads what these passes would write for it.
+bool starts_nothing(ivec2 cell, ivec2 pixel) { return is_specular() ? !is_glossy(gloss_read(pixel).gloss) : !asks(cell); }
 
 // Bound of the light of a specular path in live frames: relative to the specular albedo.
 float most_specular_light(GlossPixel gloss) { return MOST_LIVE_LIGHT / max(max_component(gloss.lobe_albedo), 1.0e-3); }
@@ -72,7 +72,7 @@ uint bounce_place(ivec2 cell, uint part) {
 }
 
 // Whether paths have a throughput other than 1 before the surface that a ray meets.
-bool has_throughput() { return VIEW.transport.filter_count != 0 || VIEW.transport.bounces > 1 || is_specular(); }
+bool has_throughput() { return VIEW.transport.roulette != 0 || VIEW.transport.filter_count != 0 || VIEW.transport.bounces > 1 || is_specular(); }
 
 // Writes the hit of a bounce ray, and the throughput of the path before the hit surface. `chain`: how the ray started.
 void bounce_hit_write(ivec2 cell, Hit hit, vec3 throughput, uint chain) {

@@ -7,10 +7,10 @@
 // The nearest hit that is not `Kind::Passed` (`renderer_vk/src/trace/input.rs`). The few rays that hit such a surface
 // are traced again without surfaces that cast no shadow. A loop, because drivers inline functions: in a loop the
 // traversal is compiled once.
-Hit trace_bounce_rays(vec3 origin, vec3 direction, uint mask) {
+Hit trace_bounce_rays(vec3 origin, float tmin, vec3 direction, uint mask) {
     Hit hit;
     for (uint i = 0; i < 2; i++) {
-        hit = trace_ray(origin, 0.0, direction, FAR, mask, false);
+        hit = trace_ray(origin, tmin, direction, FAR, mask, false);
         if (hit.geometry == NO_HIT || Geometries(VIEW.scene.geometries).at[hit.geometry].kind != KIND_PASSED) break;
         mask &= ~MASK_NO_SHADOW;
     }

@@ -22,6 +22,10 @@ void main() {
         ivec2 cell = corner + ivec2(i % WIDE, i / WIDE);
         places[i] = vec4(-1.0);
         if (any(lessThan(cell, ivec2(0))) || any(greaterThanEqual(cell, cells))) continue;
+        if (!asks(cell)) {
+            gathered[i] = NOT_GATHERED;
+            continue;
+        }
         ivec2 pixel = subsample_pixel(cell);
         places[i] = place_read(pixel);
         gathered[i] = uint(pixel.x) | uint(pixel.y) << 16;
@@ -38,6 +42,7 @@ void main() {
         if (is_own || any(greaterThanEqual(pixel, size))) continue;
         vec4 position = place_read(pixel);
         vec3 light = vec3(0.0);
+        bool found_some = true;
         if (position.w >= 0.0) {
             vec3 normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.images.surface], pixel).x);
             float tolerance = 0.1 + 6.0 * position.w * VIEW.camera.pixel_spread;
@@ -63,8 +68,10 @@ void main() {
                 weight += near;
             }
             if (weight > 0.0) light /= weight;
+            else if (ADAPTIVE != 0 && gathered[own] == NOT_GATHERED) found_some = false;
             else if (any_weight > 0.0) light = any_light / any_weight;
         }
-        light_write(VIEW.images.indirect, pixel, light, dither(pixel, DITHER_UPSAMPLED));
+        if (ADAPTIVE != 0 && !found_some) imageStore(uimages_r32ui[VIEW.images.indirect], pixel, uvec4(NOT_GATHERED));
+        else light_write(VIEW.images.indirect, pixel, light, dither(pixel, DITHER_UPSAMPLED));
     }
 }

@@ -4,9 +4,33 @@
 #define RELIGHT_TRACE_SUBSAMPLE_GLSL
 
 #include "trace/gradient_reproject.glsl"
+#include "trace/motion.glsl"
 
 // Edge of a cell, pixels.
 const int CELL = 2;
+
+// 1: only the cells gather that `bounce_ask.comp` has marked. 0 removes the code.
+layout(constant_id = 8) const uint ADAPTIVE = 0;
+
+// Whether the cell gathers bounced light.
+bool asks(ivec2 cell) { return ADAPTIVE == 0 || imageLoad(uimages_r32ui[DENOISE.asked], cell).x != 0; }
+
+// In the image of bounced light: no pixel around has gathered. No light is packed to this code.
+const uint NOT_GATHERED = 0xFFFFFFFFu;
+
+// Area of the surface that the pixel covers, over that which it covered in the last frame, at most 1: where the camera
+// comes closer, samples of the history belong to several pixels. Of a surface that has moved only the distance counts.
+float distortion(ivec2 pixel) {
+    Motion motion = motion_read(pixel);
+    vec4 place = place_read(pixel);
+    if (!(place.w > 0.0) || !(motion.last_view_distance > 0.0)) return 1.0;
+    vec3 normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.images.surface], pixel).x);
+    vec3 before = normalize(VIEW.last_camera.origin - place.xyz), now = normalize(VIEW.camera.origin - place.xyz);
+    float cosines = max(abs(dot(normal, before)), 0.01) / max(abs(dot(normal, now)), 0.01);
+    float distances = place.w / motion.last_view_distance;
+    // half floats round distances by a two-thousandth
+    return min(distances * distances * cosines + 1.0e-3, 1.0);
+}
 
 // Position in its cell of the pixel that gathers, for a row of cells.
 ivec2 gathered_offset(int row) {
@@ -33,7 +57,7 @@ ivec2 subsample_pixel(ivec2 cell) {
 
 // Whether the pixel itself has gathered bounced light.
 bool is_gathered(ivec2 pixel) {
-    return (VIEW.flags & VIEW_SUBSAMPLED_BOUNCE) == 0 || subsample_pixel(pixel / CELL) == pixel;
+    return (VIEW.flags & VIEW_SUBSAMPLED_BOUNCE) == 0 || asks(pixel / CELL) && subsample_pixel(pixel / CELL) == pixel;
 }
 
 #endif

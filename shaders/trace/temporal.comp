@@ -88,6 +88,7 @@ vec2 variance_around(float depth, vec2 depth_gradient) {
             float other = depths[(y + 1) * (TILE + 2) + x + 1];
             if (other == 0.0 || abs(depth / other - 1.0 - dot(depth_gradient, vec2(ivec2(x, y) - own))) > 0.02) continue;
             vec2 level = levels[y * TILE + x];
+            if (ADAPTIVE != 0 && level.y < 0.0) continue;
             moments += vec4(level, level * level);
             count += 1.0;
         }
@@ -132,14 +133,20 @@ void main() {
     int index = int(gl_LocalInvocationIndex);
     if (index < STRATA * STRATA) choices[index] = choice_of(first_stratum + ivec2(index % STRATA, index / STRATA));
     vec3 direct = vec3(0.0), indirect = vec3(0.0);
+    // the pixel has bounced light of this frame
+    bool is_fresh = true;
     if (inside(pixel)) {
         direct = light_read(VIEW.images.direct, pixel);
-        if (BOUNCES != 0) indirect = light_read(VIEW.images.indirect, pixel);
+        if (BOUNCES != 0) {
+            uint packed = imageLoad(uimages_r32ui[VIEW.images.indirect], pixel).x;
+            if (ADAPTIVE != 0) is_fresh = packed != NOT_GATHERED;
+            if (is_fresh) indirect = unpack_light(packed);
+        }
     }
     vec2 luminances = vec2(luminance(direct), luminance(indirect));
     direct = texel_of(direct);
     indirect = texel_of(indirect);
-    levels[index] = vec2(direct.x, indirect.x);
+    levels[index] = vec2(direct.x, is_fresh ? indirect.x : -1.0);
     load_depths();
     if (!inside(pixel)) return;
     float depth = own_depth();
@@ -174,6 +181,7 @@ void main() {
     vec2 frames = vec2(0.0), variance = vec2(0.0);
     if (h.weight > 0.0) {
         frames = h.frames;
+        if (ADAPTIVE != 0) frames.y *= distortion(pixel);
         vec2 weight = MIN_WEIGHT, change = vec2(0.0);
         if ((DENOISE.flags & DENOISE_GRADIENTS) != 0) {
             // A change of the light makes the history wrong by that fraction; the weight follows from the ratio of
@@ -187,17 +195,21 @@ void main() {
             vec2 ratio = change * change / max(left * left, 1.0e-6);
             change = 2.0 / (1.0 + sqrt(1.0 + 4.0 / max(ratio, 1.0e-12)));
             frames *= 1.0 - change;
+            // the next frame has samples, and does not detect this change any more; few places detect that of bounced light
+            if (!is_fresh) frames.y = min(frames.y, 1.0 / max(max(change.x, change.y), 1.0e-3) - 1.0);
             weight = max(weight, change);
         }
         weight = max(weight, 1.0 / (frames + 1.0));
+        if (!is_fresh) weight.y = 0.0;
         // a known change is not noise
         vec2 away = (1.0 - change) * (light.level - h.light.level);
         variance = mix(h.light.variance * (1.0 - change), away * away, max(weight, MIN_VARIANCE_WEIGHT));
+        if (!is_fresh) variance.y = h.light.variance.y;
         light.level = mix(h.light.level, light.level, weight);
         light.green = mix(h.light.green, light.green, weight);
         light.red = mix(h.light.red, light.red, weight);
     }
-    frames = min(frames + 1.0, 1.0 / MIN_WEIGHT);
+    frames = min(frames + vec2(1.0, is_fresh ? 1.0 : 0.0), 1.0 / MIN_WEIGHT);
     if (min(frames.x, frames.y) < TRUSTED_FRAMES) {
         vec2 around = variance_around(depth, depth_gradient);
         variance = mix(variance, max(variance, around), lessThan(frames, vec2(TRUSTED_FRAMES)));

@@ -3,13 +3,13 @@
 use super::pass_set::PassSet;
 use super::passes::{Pass, Switch};
 use super::view_tracer::samples_one_light;
-use super::{antialias, denoise, indirect, photons};
+use super::{antialias, denoise, indirect, photons, screen};
 use crate::gpu::Error;
 use crate::settings::{DenoiserChoice, Settings};
 
 /// Passes that the settings decide about, or that every frame runs, the slowest to compile first. Others are
 /// compiled when a frame first runs them.
-const AHEAD: [Pass; 35] = [
+const AHEAD: [Pass; 39] = [
     Pass::Primary,
     Pass::BounceShadeLast,
     Pass::BounceShade,
@@ -45,6 +45,10 @@ const AHEAD: [Pass; 35] = [
     Pass::SparseFilter,
     Pass::BloomDown,
     Pass::BloomUp,
+    Pass::ScreenSurface,
+    Pass::ScreenMarch,
+    Pass::ScreenLight,
+    Pass::BounceAsk,
 ];
 /// Passes that only maps with fog run.
 const FOG_AHEAD: [Pass; 2] = [Pass::FogLight, Pass::FogFilter];
@@ -62,6 +66,8 @@ fn is_chosen(pass: Pass, settings: &Settings, needs: MapNeeds) -> bool {
         Pass::MirrorLight | Pass::BounceRays | Pass::BounceShadeLast | Pass::BounceLight => {
             settings.rt_bounces > 0 || gloss
         }
+        Pass::ScreenSurface | Pass::ScreenMarch | Pass::ScreenLight => screen::in_use(settings),
+        Pass::BounceAsk => indirect::is_adaptive(settings),
         Pass::SpecularLight => gloss,
         Pass::Photons | Pass::PhotonCells => needs.bodies && photons::in_use(settings),
         Pass::BounceUpsample => indirect::is_subsampled(settings, false),
@@ -121,13 +127,16 @@ fn states(pass: Pass, settings: &Settings, needs: MapNeeds) -> Vec<usize> {
             Switch::Caustics => needs.bodies && photons::in_use(settings),
             Switch::Timed => false,
             Switch::BlueNoise => settings.rt_blue_noise,
+            Switch::ScreenHits => screen::in_use(settings),
+            Switch::Adaptive => indirect::is_adaptive(settings),
+            Switch::Roulette => settings.rt_bounce_roulette,
         };
         if !on {
             continue;
         }
         let with = states.iter().map(|state| state | 1 << bit).collect();
-        if *switch == Switch::LitFog {
-            // fog out of sight is not lit
+        if matches!(switch, Switch::LitFog | Switch::ScreenHits) {
+            // fog out of sight is not lit; the first frame has no last picture
             states.extend::<Vec<usize>>(with);
         } else {
             states = with;

@@ -111,6 +111,8 @@ impl AdaptiveImages {
 pub struct Denoiser {
     device: Device,
     images: Option<Images>,
+    /// For each cell of 2 × 2 pixels, whether it gathers bounced light; only where not all do.
+    asked: Option<Image>,
     /// Placeholder for absent images: software drivers access the images of branches that are not taken.
     nothing: Image,
     /// The images hold valid light of the last frame.
@@ -128,6 +130,7 @@ impl Denoiser {
         Ok(Self {
             device: device.clone(),
             images: None,
+            asked: None,
             nothing: make(device, "trace no light", [1, 1], Format::Rgba32Uint)?,
             history: false,
             gradients: true,
@@ -163,6 +166,21 @@ impl Denoiser {
         Ok(())
     }
 
+    /// Makes or drops the image of the cells that gather bounced light.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn prepare_cells(&mut self, adaptive: bool, size: [u32; 2]) -> Result<(), Error> {
+        let cells = size.map(|n| n.div_ceil(2));
+        let fits = |image: &Image| adaptive && [image.width(), image.height()] == cells;
+        self.asked = self.asked.take().filter(fits);
+        if adaptive && self.asked.is_none() {
+            let made = make(&self.device, "trace asked cells", cells, Format::R32Uint)?;
+            self.asked = Some(made);
+        }
+        Ok(())
+    }
+
     /// Whether this frame is filtered.
     pub fn is_on(&self) -> bool {
         self.images.is_some()
@@ -195,6 +213,7 @@ impl Denoiser {
             stratum_guide: nothing,
             gradient: nothing,
             past: nothing,
+            asked: (self.asked.as_ref()).map_or(nothing, Image::storage_index),
             depth_gradient: targets.depth_gradient[0].storage_index(),
             ..DenoiseView::default()
         };

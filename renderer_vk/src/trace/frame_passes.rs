@@ -34,6 +34,12 @@ pub struct FrameFacts {
     pub timed: bool,
     /// Random numbers of light are blue noise over the picture.
     pub blue_noise: bool,
+    /// Bounces may hit the last frame's picture.
+    pub screen: bool,
+    /// Only some cells gather bounced light.
+    pub adaptive: bool,
+    /// Paths may end where they have found light.
+    pub roulette: bool,
 }
 
 impl FrameFacts {
@@ -43,6 +49,9 @@ impl FrameFacts {
             Switch::MapFog => self.map_fog,
             Switch::Bounces => self.bounces,
             Switch::Gloss => self.gloss,
+            Switch::ScreenHits => self.screen,
+            Switch::Adaptive => self.adaptive,
+            Switch::Roulette => self.roulette,
             Switch::Caustics => self.photons > 0,
             Switch::Timed => self.timed,
             Switch::BlueNoise => self.blue_noise,

@@ -25,6 +25,14 @@ pub fn is_subsampled(settings: &Settings, gloss: bool) -> bool {
     denoise::in_use(settings) != DenoiserChoice::None && (settings.rt_bounces > 0 || gloss)
 }
 
+/// Whether only those cells of 2 × 2 pixels gather bounced light whose history needs it. The adaptive denoiser holds the
+/// number of its samples, and the changes of the light.
+pub fn is_adaptive(settings: &Settings) -> bool {
+    settings.rt_bounce_adaptive > 0
+        && settings.rt_bounces > 0
+        && denoise::in_use(settings) == DenoiserChoice::ASvgf
+}
+
 /// Bounces of a path that starts by a specular lobe: one more than `rt_bounces`, as for a path behind a mirror, so that the
 /// surface that its first ray hits has all bounces of a visible one. Live frames without rough `metal` save it: other
 /// surfaces reflect little.
@@ -48,6 +56,9 @@ pub fn record(
     samples: u32,
 ) -> Result<(), Error> {
     let parts = if passes.facts.subsampled { 1 } else { 4 };
+    if passes.facts.adaptive {
+        passes.run(Pass::BounceAsk)?;
+    }
     // the number of the path is in the bits above those of the pixel
     let runs =
         (0..samples).flat_map(|path| (0..parts).map(move |part| part | path << t::PART_PATH_SHIFT));
@@ -100,6 +111,9 @@ fn trace_path(
         // mirrors light diffuse vertices
         if transport.mirror_count > 0 && !(specular && bounce == 0) {
             passes.run_numbered(Pass::MirrorLight, bounce, part)?;
+        }
+        if passes.facts.screen && !specular && bounce == 0 {
+            passes.run_numbered(Pass::ScreenMarch, bounce, part)?;
         }
         passes.run_numbered(Pass::BounceRays, bounce, part)?;
         let shade = if bounce + 1 < bounces {

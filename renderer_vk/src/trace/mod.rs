@@ -49,6 +49,7 @@ pub mod pass_set;
 pub mod passes;
 mod photons;
 mod pixel_times;
+mod screen;
 mod shapes;
 mod solids;
 mod specular;

@@ -15,14 +15,11 @@ pub enum Pipeline {
     Compute(ComputePipeline),
 }
 
-/// Most switches of a pass.
-pub const SWITCHES: usize = 5;
-
 /// Pipelines of each pass, by the state of its switches: one bit each.
 pub struct PassSet {
     device: Device,
     tracer: Tracer,
-    pipelines: Vec<[OnceLock<Pipeline>; 1 << SWITCHES]>,
+    pipelines: Vec<Vec<OnceLock<Pipeline>>>,
 }
 
 impl PassSet {
@@ -31,7 +28,13 @@ impl PassSet {
         Self {
             device: device.clone(),
             tracer,
-            pipelines: TABLE.iter().map(|_| Default::default()).collect(),
+            pipelines: (TABLE.iter())
+                .map(|row| {
+                    (0..1 << row.switches.len())
+                        .map(|_| OnceLock::new())
+                        .collect()
+                })
+                .collect(),
         }
     }
 
@@ -51,7 +54,7 @@ impl PassSet {
     /// The driver refuses the pipeline.
     pub fn get(&self, pass: Pass, on: usize) -> Result<&Pipeline, Error> {
         let pass = pass.row().shares.unwrap_or(pass);
-        let place = &self.pipelines[pass as usize][on & ((1 << SWITCHES) - 1)];
+        let place = self.place(pass, on);
         match place.get() {
             Some(made) => Ok(made),
             None => {
@@ -59,6 +62,11 @@ impl PassSet {
                 Ok(place.get_or_init(|| made))
             }
         }
+    }
+
+    fn place(&self, pass: Pass, on: usize) -> &OnceLock<Pipeline> {
+        let states = &self.pipelines[pass as usize];
+        &states[on & (states.len() - 1)]
     }
 
     fn compile(&self, pass: Pass, on: usize) -> Result<Pipeline, Error> {
@@ -104,7 +112,7 @@ impl PassSet {
         variants: impl Iterator<Item = (Pass, usize)>,
     ) -> Result<(), Error> {
         let is_missing = |&(pass, on): &(Pass, usize)| {
-            let place = &self.pipelines[pass as usize][on & ((1 << SWITCHES) - 1)];
+            let place = self.place(pass, on);
             place.get().is_none()
         };
         let jobs: Vec<_> = variants

@@ -61,6 +61,12 @@ pub enum Switch {
     Timed,
     /// The random numbers of light are blue noise over the picture.
     BlueNoise,
+    /// Bounces may hit the last frame's picture.
+    ScreenHits,
+    /// Only some cells gather bounced light.
+    Adaptive,
+    /// Paths of bounces may end where they have found light.
+    Roulette,
 }
 
 /// Data that passes exchange within a frame.
@@ -98,8 +104,16 @@ pub enum Resource {
     SampledLights,
     /// Direct light without albedo; the denoiser leaves the sum of all filtered light here.
     DirectLight,
+    /// Cells of 2 × 2 pixels that gather bounced light.
+    AskedCells,
     /// What the rays of a bounce hit.
     BounceHits,
+    /// Hits of bounce rays in the last frame's picture.
+    ScreenHits,
+    /// Albedo and emission of the first surface of each pixel, for the bounces of the next frame.
+    ScreenSurfaces,
+    /// Its light and distance.
+    ScreenLight,
     /// For each of those hits, the light that its shadow ray tests, and the path that goes on from there.
     BounceLights,
     /// Bounced light without albedo.
@@ -158,6 +172,7 @@ impl Resource {
         match self {
             Self::SampledLights
             | Self::BounceHits
+            | Self::ScreenHits
             | Self::BounceLights
             | Self::GradientSamples
             | Self::GradientSums
@@ -231,7 +246,7 @@ macro_rules! passes {
         /// Declarations, in the order of [`Pass`].
         pub static TABLE: &[Row] = {
             #[allow(clippy::enum_glob_use)] // rows name many of them
-            use {Resource::*, Shader::{Compute, Rays}, Switch::{BlueNoise, Bounces, Caustics, Gloss, LitFog, MapFog, Timed}};
+            use {Resource::*, Shader::{Compute, Rays}, Switch::{Adaptive, BlueNoise, Bounces, Caustics, Gloss, LitFog, MapFog, Roulette, Timed}};
             &[$(Row { $($field: $value,)* ..Row::of(concat!($($about),+), $name, $shader, Size::$size) }),+]
         };
     };
@@ -265,6 +280,12 @@ passes! {
         switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed)],
         reads: &[Scene, PrimaryHits, GBuffer],
         writes: &[Other],
+    }
+    /// What bounces of the next frame take from the first surface of each pixel, but for the light (`rt_bounceScreen`).
+    ScreenSurface = "trace_screen_surface", Compute(&shaders::TRACE_SCREEN_SURFACE_COMP), Traced {
+        switches: &[(ids::specular::HAS_GLOSS, Gloss)],
+        reads: &[Scene, PrimaryHits, GBuffer],
+        writes: &[ScreenSurfaces],
     }
     /// Visibility of flares.
     FlareRays = "trace_flares", Rays(&shaders::TRACE_FLARES), Flares {
@@ -323,40 +344,52 @@ passes! {
     }
     /// Light that flat mirrors of the map reflect onto the surfaces from which a bounce starts.
     MirrorLight = "trace_mirror_light", Rays(&shaders::TRACE_MIRROR_LIGHT), Cells {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::subsample::ADAPTIVE, Adaptive)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals],
-        may_read: &[GradientPixels, BounceLights],
+        may_read: &[GradientPixels, BounceLights, AskedCells],
         writes: &[BounceLights],
         counter: Some(t::COUNT_MIRRORS),
     }
+    /// Selects the cells that gather bounced light (`rt_bounceAdaptive`).
+    BounceAsk = "trace_bounce_ask", Compute(&shaders::TRACE_BOUNCE_ASK_COMP), Cells {
+        reads: &[GBuffer, Positions, Normals],
+        writes: &[AskedCells],
+    }
+    /// Hits of the first ray of a path in the last frame's picture (`rt_bounceScreen`).
+    ScreenMarch = "trace_screen_march", Compute(&shaders::TRACE_SCREEN_MARCH_COMP), Cells {
+        switches: &[(ids::subsample::ADAPTIVE, Adaptive)],
+        reads: &[GBuffer, Positions, Normals],
+        may_read: &[GradientPixels, AskedCells],
+        writes: &[ScreenHits],
+    }
     /// Rays of a bounce.
     BounceRays = "trace_bounce_rays", Rays(&shaders::TRACE_BOUNCE_RAYS), Cells {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive), (ids::bounce_rays::ROULETTE, Roulette)],
         reads: &[Scene, GBuffer, Positions, Normals],
-        may_read: &[GradientPixels, BounceLights, GlossSurfaces],
+        may_read: &[GradientPixels, BounceLights, GlossSurfaces, ScreenHits, AskedCells, DirectLight],
         writes: &[BounceHits],
         counter: Some(t::COUNT_BOUNCE_RAYS),
     }
     /// Shades what they hit, and samples a light for it.
     BounceShade = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
-        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
+        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
-        may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells],
+        may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells, AskedCells],
         writes: &[BounceLights, GlossSurfaces],
     }
     /// The same of the last bounce, after which no path goes on.
     BounceShadeLast = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
         constants: &[(ids::bounce::LAST_BOUNCE, 1)],
-        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
+        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
-        may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells],
+        may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells, AskedCells],
         writes: &[BounceLights, GlossSurfaces],
     }
     /// Shadow rays to those lights; the last writes the light of the paths, of one of both kinds.
     BounceLight = "trace_bounce_light", Rays(&shaders::TRACE_BOUNCE_LIGHT), Cells {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::subsample::ADAPTIVE, Adaptive)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceLights],
-        may_read: &[GradientPixels, GlossSurfaces],
+        may_read: &[GradientPixels, GlossSurfaces, AskedCells],
         writes: &[IndirectLight, GlossLight],
         counter: Some(t::COUNT_BOUNCE_LIGHT),
     }
@@ -370,13 +403,16 @@ passes! {
     }
     /// Interpolates bounced light to the pixels that did not gather it.
     BounceUpsample = "trace_bounce_upsample", Compute(&shaders::TRACE_BOUNCE_UPSAMPLE_COMP), Cells {
+        switches: &[(ids::subsample::ADAPTIVE, Adaptive)],
         reads: &[GBuffer, Positions, Normals, IndirectLight],
-        may_read: &[GradientPixels],
+        may_read: &[GradientPixels, AskedCells],
         writes: &[IndirectLight],
     }
     /// Change of the light of each gradient pixel.
     GradientSample = "trace_gradient_sample", Compute(&shaders::TRACE_GRADIENT_SAMPLE_COMP), Strata {
+        switches: &[(ids::subsample::ADAPTIVE, Adaptive)],
         reads: &[GradientPixels, DirectLight, IndirectLight],
+        may_read: &[AskedCells],
         writes: &[GradientSamples],
     }
     /// Filters it over strata up to 6 away.
@@ -391,9 +427,9 @@ passes! {
     }
     /// A-SVGF: joins the light with that of earlier frames.
     Temporal = "trace_temporal", Compute(&shaders::TRACE_TEMPORAL_COMP), Traced {
-        switches: &[(ids::temporal::BOUNCES, Bounces)],
+        switches: &[(ids::temporal::BOUNCES, Bounces), (ids::subsample::ADAPTIVE, Adaptive)],
         reads: &[GBuffer, Positions, Normals, DirectLight, IndirectLight],
-        may_read: &[GradientPixels, Gradients],
+        may_read: &[GradientPixels, Gradients, AskedCells],
         writes: &[FreshLight, DepthGradient, Past],
     }
     /// A-SVGF: first wavelet step; its result is the history of the next frame.
@@ -454,6 +490,12 @@ passes! {
         reads: &[GBuffer, Shown, DirectLight],
         may_read: &[IndirectLight, GlossSurfaces, GlossLight, Other, FogWeights, FogLight, FilteredFogLight, Gradients],
         writes: &[Picture],
+    }
+    /// Depth and light of this frame for the bounces of the next.
+    ScreenLight = "trace_screen_light", Compute(&shaders::TRACE_SCREEN_LIGHT_COMP), Traced {
+        reads: &[GBuffer, ScreenSurfaces, DirectLight],
+        may_read: &[IndirectLight],
+        writes: &[ScreenLight],
     }
     /// Temporal antialiasing, and upscaling with it.
     Antialias = "trace_antialias", Compute(&shaders::TRACE_ANTIALIAS_COMP), Output {

@@ -25,6 +25,7 @@ use super::pass_set::PassSet;
 use super::passes::{COUNTERS, Pass, Resource};
 use super::photons::{self, Photons};
 use super::pixel_times::PixelTimes;
+use super::screen::LastScreen;
 use super::specular::SpecularTable;
 use super::targets::{OwnImages, Targets};
 use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
@@ -75,6 +76,7 @@ pub struct ViewTracer {
     motion: Motion,
     bloom: Bloom,
     blue_noise: BlueNoise,
+    screen: LastScreen,
     pub(super) photons: Photons,
     counters: RayCounters,
     pixel_times: PixelTimes,
@@ -127,6 +129,7 @@ impl ViewTracer {
             motion: Motion::default(),
             bloom: Bloom::default(),
             blue_noise: BlueNoise::default(),
+            screen: LastScreen::default(),
             photons: Photons::default(),
             counters: RayCounters::default(),
             pixel_times: PixelTimes::default(),
@@ -263,6 +266,7 @@ impl ViewTracer {
         self.fog.advance();
         targets.advance();
         self.antialias.advance();
+        self.screen.advance();
         self.exposure_started = true;
         Ok(())
     }
@@ -286,6 +290,7 @@ impl ViewTracer {
         let goes_on = self.history.is_some();
         let denoiser = denoise::in_use(settings);
         self.denoiser.prepare(denoiser, size, goes_on)?;
+        (self.denoiser).prepare_cells(indirect::is_adaptive(settings), size)?;
         let has_fog = map.is_some_and(|m| fog_in_sight(&m, scene));
         self.fog.prepare(
             has_fog && is_lit(settings),
@@ -296,6 +301,7 @@ impl ViewTracer {
         let has_bodies = map.is_some_and(|m| !m.geometry.bodies.is_empty());
         let caustics = has_bodies && is_lit(settings) && photons::in_use(settings);
         self.photons.prepare(&self.device, caustics)?;
+        (self.screen).prepare(&self.device, settings, size, goes_on)?;
         let accumulated = self.accumulated_before(scene, materials, settings);
         let accel = self
             .accel
@@ -356,6 +362,7 @@ impl ViewTracer {
         if !settings.rt_accumulate {
             passes.run_numbered(Pass::OtherSide, 1, 0)?;
         }
+        self.screen.keep_surfaces(passes)?;
         if facts.flares > 0 {
             passes.run(Pass::FlareRays)?;
         }
@@ -376,6 +383,7 @@ impl ViewTracer {
         self.fog.record(passes, &targets.fog)?;
         self.counters.end(passes.rec)?;
         passes.run(Pass::Composite)?;
+        self.screen.keep_light(passes)?;
         self.antialias.record(passes)?;
         passes.run(Pass::Histogram)?;
         passes.run(Pass::Exposure)?;
@@ -407,6 +415,9 @@ impl ViewTracer {
             gloss: targets.specular.is_some(),
             timed: self.pixel_times.are_shown(),
             blue_noise: settings.rt_blue_noise,
+            screen: self.screen.is_known(),
+            adaptive: indirect::is_adaptive(settings),
+            roulette: settings.rt_bounce_roulette,
         }
     }
 

@@ -254,6 +254,8 @@ pub const DITHER_SAMPLE_ROW: u32 = 7;
 /// Rounding of specular light, and rotation of its taps.
 pub const DITHER_SPECULAR: u32 = 8;
 pub const DITHER_SPECULAR_TURN: u32 = 9;
+/// Rounding of the light that the next frame's bounces take.
+pub const DITHER_SCREEN: u32 = 10;
 
 /// Lights of the pass of direct light (`SAMPLING` in `direct.rgen`): lights that it samples itself; lights that
 /// `sample_lights.comp` has sampled; suns.

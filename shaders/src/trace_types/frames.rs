@@ -71,7 +71,25 @@ pub struct DenoiseView {
     /// R32UI: number of frames and variance of each pixel, which the last filter step puts into the history. Until the
     /// temporal pass writes them it holds bounced light.
     pub past: u32,
-    /// Not used.
+    /// R32UI, one texel for each cell of 2 × 2 pixels: 1 if it gathers bounced light in this frame.
+    pub asked: u32,
+}
+
+/// What bounces of the next frame take from this one; bindless indices of images.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct ScreenView {
+    /// RG32UI: albedo and emission of the first surface of each pixel.
+    pub surface: u32,
+    /// R32UI: its distance, and the least distance of the pixels around, as 16-bit floats.
+    pub depth: u32,
+    /// R32UI: the light that it sends in all directions.
+    pub light: u32,
+    /// Most samples of a ray.
+    pub steps: u32,
+    /// Thickness of a surface, widths of a pixel there.
+    pub thickness: f32,
+    /// To a multiple of eight bytes.
     pub padding: u32,
 }
 

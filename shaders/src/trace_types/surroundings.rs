@@ -92,6 +92,10 @@ pub struct TransportView {
     pub specular_bounces: u32,
     /// `SPECULAR_*`.
     pub specular_estimator: u32,
+    /// Samples of bounced light in its history, from which on a pixel traces no more; 0: all trace.
+    pub bounce_samples: f32,
+    /// 1: paths may end at their first ray, so that it has a throughput.
+    pub roulette: u32,
     /// To a multiple of eight bytes.
     pub padding: u32,
 }

@@ -12,6 +12,7 @@ use super::harness::{
     Gpu, Scene, bounced, encode, floor_at, floor_points, gpu_tests, lambert, rectangle, stage,
     through_byte,
 };
+use super::screen_hits::on_screen;
 use crate::settings::{DenoiserChoice, LightSelection, MOST_BOUNCES, Settings};
 use crate::trace::frame_lights::decode;
 
@@ -269,6 +270,19 @@ fn no_light_leaks_through_walls(gpu: &mut Gpu) {
                     Vec3::ZERO,
                     "pixel {i}, {selection:?}, cull {culling}"
                 );
+            }
+        }
+        // nor by the picture of the last frame, be it that of the bright room
+        for frames in [[0, 8], [4, 4], [4, 1]] {
+            let [bright, dark] = frames;
+            let origin = scene.def.view_origin;
+            let (pixels, _) =
+                gpu.render_path(&scene, &on_screen(1), bright + dark, |frame, def| {
+                    let x = if frame < bright { 90.0 } else { -90.0 };
+                    def.view_origin = Vec3::new(x, origin.y, origin.z);
+                });
+            for (i, pixel) in pixels.iter().enumerate() {
+                assert_eq!(*pixel, Vec3::ZERO, "pixel {i}, {frames:?}, cull {culling}");
             }
         }
         // the lamp lights its own side

@@ -79,6 +79,7 @@ impl ViewTracer {
             antialias: prepared.antialias,
             fog: self.fog.view(&targets.direct[0], &targets.fog),
             images: self.image_view(targets),
+            screen: self.screen.view(settings, &targets.direct[0]),
             target: self.target_view(traced),
             camera: camera_view(traced, targets.height),
             // The first view has no predecessor.
@@ -139,6 +140,8 @@ impl ViewTracer {
             specular_albedo: self.specular_table.address(),
             specular_bounces: indirect::specular_bounces(settings, materials.has_metal()),
             specular_estimator: self.specular_estimator,
+            bounce_samples: settings.rt_bounce_adaptive as f32,
+            roulette: u32::from(settings.rt_bounce_roulette),
             padding: 0,
             filters: geometry.map_or(0, |g| g.surroundings.filters()),
             filter_count: geometry.map_or(0, |g| g.surroundings.filter_count()),
