@@ -41,6 +41,6 @@ pub use settings::{
     Anaglyph, DebugOutput, DenoiserChoice, HdrChoice, LightSelection, Look, MapLightChoice,
     ModelShadows, Settings, TextureMode, TracerChoice,
 };
-pub use statistics::{Costs, Latency, MemoryPurpose, PassCost, Spread, StructureCost};
+pub use statistics::{Costs, Latency, LightCost, MemoryPurpose, PassCost, Spread, StructureCost};
 pub use stereo::Eye;
 pub use world::LightsChanged;

@@ -107,6 +107,22 @@ pub struct StructureCost {
     pub cells: Option<[u32; 3]>,
 }
 
+/// Cost of the structures from which a map's lights are sampled.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LightCost {
+    /// Lights of the map, without suns.
+    pub lights: usize,
+    /// Building the lists of the cells and normal bins, with their visibility rays: wall time in milliseconds. The lists
+    /// of the clusters, which the loader makes, are not in it.
+    pub lists_ms: f64,
+    /// Bytes of the lists on the device.
+    pub lists_bytes: u64,
+    /// Building the trees: wall time in milliseconds; `None`: no frame has used them.
+    pub tree_ms: Option<f64>,
+    /// Bytes of the trees on the device.
+    pub tree_bytes: Option<u64>,
+}
+
 /// How names of passes of a traced view begin.
 const TRACED: &str = "trace_";
 

@@ -17,8 +17,8 @@ use crate::types::MaterialBuffers;
 
 pub use frames::{AntialiasView, DenoiseView, LastInstance, MotionView, ScreenView};
 pub use lights::{
-    BspNode, DynamicRow, EmittedLight, LightBounds, LightRow, LightSlot, LightView, SphereLight,
-    SunLight, TriangleLight,
+    BspNode, DynamicRow, EmittedLight, LightBounds, LightRow, LightSlot, LightTreeNode, LightView,
+    ReservoirView, SphereLight, SunLight, TriangleLight,
 };
 pub use photons::{BodyTriangle, Photon, PhotonCell, PhotonView};
 pub use structures::{
@@ -46,6 +46,8 @@ pub struct TraceView {
     pub transport: TransportView,
     /// Photons of caustics.
     pub photons: PhotonView,
+    /// Light samples of the last frame.
+    pub reservoirs: ReservoirView,
     /// Motion of surfaces.
     pub motion: MotionView,
     /// The denoiser's images.

@@ -9,6 +9,10 @@
 #include "trace/color.glsl"
 #include "trace/random.glsl"
 #include "trace/geometry.glsl"
+#include "trace/light_tree.glsl"
+
+// 1: listed lights are drawn from the tree.
+layout(constant_id = 10) const uint LIGHT_TREE = 0;
 
 // The lights that may reach a point: those of a row and its parent, the suns, and the list of lights of this frame.
 struct LightSet {
@@ -65,6 +69,11 @@ LightSet lights_of(uint place) {
         DynamicRow moving = DynamicRows(VIEW.lights.dynamic_rows).at[min(row.cluster, dynamic_rows - 1)];
         set.dynamic_first = moving.first;
         set.dynamic_count = moving.count;
+    }
+    if (LIGHT_TREE != 0) {
+        // a tree of n lights has 2 n - 1 nodes
+        set.listed = (VIEW.lights.tree_nodes + 1) / 2 + (VIEW.lights.changing_tree_nodes + 1) / 2;
+        set.parent = NO_PARENT;
     }
     return set;
 }
@@ -395,13 +404,14 @@ ListedLight draw_listed(LightSet set, float u) {
 
 // Resampled importance sampling (Talbot et al. 2005): draws candidates, selects one by its target, and weights it by
 // the inverse of its probability. Candidates come from the row's list by alias tables, with probabilities from the
-// light's contribution in the cell to surfaces of this normal bin, shadows included; a short list is taken whole.
+// light's contribution in the cell to surfaces of this normal bin, shadows included; a short list is taken whole. With
+// LIGHT_TREE each candidate is drawn by a descent of the tree.
 // Lights of this frame are candidates by themselves. Suns have a ray of their own: an occluded sun would outweigh all
 // lights that reach its shadow.
 LightChoice sample_resampled(LightSet set, vec3 position, vec3 normal, inout float u) {
     uint candidates = max(VIEW.lights.candidates, 1);
-    bool whole = set.parent == NO_PARENT && set.listed <= candidates;
-    uint drawn = whole ? set.listed : candidates, drawn_dynamic = min(set.dynamic_count, candidates);
+    bool whole = LIGHT_TREE == 0 && set.parent == NO_PARENT && set.listed <= candidates;
+    uint drawn = LIGHT_TREE != 0 ? min(set.listed, candidates) : whole ? set.listed : candidates, drawn_dynamic = min(set.dynamic_count, candidates);
     float sum = 0.0, selected_target = 0.0;
     float offset = whole ? 0.0 : rng_next(), dynamic_offset = set.dynamic_count > drawn_dynamic ? rng_next() : 0.0;
     uint selected = 0;
@@ -411,7 +421,11 @@ LightChoice sample_resampled(LightSet set, vec3 position, vec3 normal, inout flo
         uint light;
         float weight = 1.0, visibility = 1.0;
         if (i < drawn) {
-            if (whole) {
+            if (LIGHT_TREE != 0) {
+                float chance;
+                if (!draw_from_tree(position, normal, (float(i) + offset) / float(drawn), light, chance)) continue;
+                weight = 1.0 / (chance * float(drawn));
+            } else if (whole) {
                 LightSlot slot = LightSlots(VIEW.lights.slots).at[set.first + i];
                 light = slot.light;
                 visibility = slot_visibility(slot);

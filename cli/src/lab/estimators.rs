@@ -1,14 +1,18 @@
 //! `relight-lab estimators`: bias and noise of the ways to sample lights.
 
+use std::sync::Arc;
+
 use anyhow::{Context, Result};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use relight::GameFiles;
 use renderer_vk::api::RefEntity;
-use renderer_vk::{LightSelection, Look, Renderer, RendererOptions, Settings};
+use renderer_vk::{LightSelection, Look, MapLightChoice, Renderer, RendererOptions, Settings};
 use serde_json::{Value, json};
 
+use super::growth::scene;
 use crate::chosen::parse_view;
-use crate::game::Maps;
+use crate::game::Game;
 use crate::render::parse_size;
 use crate::settings::{Assignment, SettingArgs, default, help, value_of};
 use crate::view::{Camera, draw, load, open};
@@ -16,11 +20,13 @@ use crate::view::{Camera, draw, load, open};
 /// Compare the ways to sample lights: all have the same mean
 ///
 /// Renders a view with every light of the list (the reference), with one light chosen uniformly, with one chosen by
-/// importance, and with every light of the map. Prints for each the relative difference of the whole picture, and of
+/// importance from the lists, from a tree over all lights, from the lists with the samples of neighbouring pixels, from
+/// one list of all lights, and with every light of the map. Prints for each the relative difference of the whole picture, and of
 /// the worst tile of 16 x 16 pixels, from the reference, in percent and in standard errors (noise stays below 4 or 5,
 /// bias grows with the frames), and the noise of the first frame, of 16 and of all: the mean squared error over the
 /// squared mean of the picture, times the frames. Frames that are independent have the same noise; that of all frames
-/// includes the noise of the reference. JSON also has the mean over the pixels of the squared error over the squared
+/// includes the noise of the reference. Milliseconds are those of the passes that sample lights for visible surfaces and
+/// trace the rays, on the GPU; bytes and build times those of the lists or of the tree. JSON also has the mean over the pixels of the squared error over the squared
 /// pixel, where pixels below a hundredth of the picture's mean count as that. A tile darker than a hundredth of the
 /// picture is measured against that. --tiles adds the noisiest tiles of each estimator: position, relative brightness,
 /// difference and standard error of its mean. These predict the noise after more frames: the standard error falls at
@@ -29,8 +35,20 @@ use crate::view::{Camera, draw, load, open};
 /// Example: relight-lab estimators oa_dm1 --frames 4096 --size 512x384
 #[derive(Args, Debug)]
 pub struct EstimatorsArgs {
+    /// Maps: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp file, a pack (.pk3) with one map, or pack.pk3:maps/x.bsp
+    #[arg(value_name = "MAP", required_unless_present = "made")]
+    maps: Vec<String>,
     #[command(flatten)]
-    chosen: Maps,
+    game: Game,
+    /// Made-up halls with so many lights each
+    #[arg(long, value_name = "LIGHTS,…", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    made: Vec<u32>,
+    /// Only estimators whose name begins with this, besides the reference; may be repeated
+    #[arg(long, value_name = "NAME")]
+    only: Vec<String>,
+    /// Take every light of the map as the reference, not those of the lists
+    #[arg(long)]
+    unculled_reference: bool,
     /// Frames of each estimator
     #[arg(long, value_name = "N", default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..))]
     frames: u32,
@@ -70,6 +88,9 @@ const TILE: usize = 16;
 /// Numbers of frames at which noise is measured, besides all frames.
 const NOISE_FRAMES: [u32; 2] = [1, 16];
 
+/// Passes that sample lights for visible surfaces, and trace rays to them.
+const DIRECT: [&str; 2] = ["trace_sample_lights", "trace_direct"];
+
 /// A picture: linear RGB.
 type Picture = Vec<[f32; 3]>;
 
@@ -80,7 +101,7 @@ struct Rendered {
     frames: u32,
     /// Means of the first frames, with their number.
     early: Vec<(u32, Picture)>,
-    /// Median time of the pass for direct light, milliseconds.
+    /// Median time of the passes for direct light without suns, milliseconds.
     time: f32,
 }
 
@@ -92,7 +113,7 @@ struct Stage {
 }
 
 impl Stage {
-    /// Renders `frames` frames: their mean, those of the first ones, and the median time of the pass for direct light.
+    /// Renders `frames` frames: their mean, those of the first ones, and the median time of the passes for direct light.
     fn render(&mut self, name: &str, settings: &Settings, frames: u32) -> Result<Rendered> {
         let bar = ProgressBar::new(frames.into());
         bar.set_style(ProgressStyle::with_template(
@@ -109,7 +130,8 @@ impl Stage {
                 early.push((frame, self.renderer.read_radiance()?));
             }
             let passes = self.renderer.timings();
-            times.extend(passes.iter().find(|p| p.0.contains("direct")).map(|p| p.1));
+            let direct = passes.iter().filter(|p| DIRECT.contains(&p.0.as_str()));
+            times.push(direct.map(|p| p.1).sum());
             bar.inc(1);
         }
         bar.finish_and_clear();
@@ -242,7 +264,7 @@ fn row(line: &Value) {
     let number = |key: &str| line.get(key).and_then(Value::as_f64).unwrap_or(0.0);
     let noise = |path: &str| line.pointer(path).and_then(Value::as_f64).unwrap_or(0.0);
     println!(
-        "{:<18} {:>6} {:>9.3} % {:>7.1} {:>9.2} % {:>7.1} {:>9.3} {:>9.3} {:>9.3} {:>9.2}",
+        "{:<18} {:>6} {:>9.3} % {:>7.1} {:>9.2} % {:>7.1} {:>9.3} {:>9.3} {:>9.3} {:>9.2} {:>10.2} {:>8.0} {:>9.1}",
         line["estimator"].as_str().unwrap_or("?"),
         number("frames"),
         number("difference") * 100.0,
@@ -256,6 +278,9 @@ fn row(line: &Value) {
             .and_then(|all| all.last()?.get("noise")?.as_f64())
             .unwrap_or(0.0),
         number("direct_ms"),
+        number("direct_ms") * noise("/noise/0/noise"),
+        number("structure_bytes") / 1024.0,
+        number("structure_ms"),
     );
     let tiles = line.get("noisiest_tiles").and_then(Value::as_array);
     for tile in tiles.into_iter().flatten() {
@@ -271,112 +296,179 @@ fn row(line: &Value) {
     }
 }
 
+/// A scene to render.
+struct Subject {
+    name: String,
+    files: Arc<dyn GameFiles>,
+    map: String,
+    /// `None`: that of the map.
+    camera: Option<Camera>,
+}
+
 /// Runs the command: a table for each map, or one JSON object a map and estimator.
 pub fn run(args: &EstimatorsArgs) -> Result<()> {
-    for map in &args.chosen.maps {
-        let (files, map) = open(map, &args.chosen.game)?;
-        let base = Settings {
-            rt: Look::Traced,
-            rt_accumulate: true,
-            rt_auto_exposure: false,
-            // only light sampling may cause differences
-            rt_antialiasing: false,
-            rt_num_random_dl: 1,
-            ..Settings::full_size()
+    for map in &args.maps {
+        let (files, map) = open(map, &args.game)?;
+        let subject = Subject {
+            name: map.clone(),
+            files,
+            map,
+            camera: args.view,
         };
-        let base = (args.set).change([&args.bounces, &args.candidates], base);
-        let (width, height) = args.size;
-        let mut renderer = Renderer::new(RendererOptions {
-            device: args.device.clone(),
-            ..RendererOptions::headless(width, height)
-        })
-        .context("no picture without a Vulkan device")?;
-        let (bsp, entities) = load(&mut renderer, files, &map, &base)?;
-        let camera = (args.view.or_else(|| Camera::of_map(&bsp)))
-            .context("the map has no place for a camera; set one with --view")?;
-        let mut stage = Stage {
-            renderer,
-            entities,
-            camera,
-            size: args.size,
+        compare_on(args, subject, MapLightChoice::Calibrated)?;
+    }
+    for &lights in &args.made {
+        let made = scene::Made {
+            lights: lights as usize,
+            ..scene::Made::default()
         };
+        let subject = Subject {
+            name: format!("made {lights}"),
+            files: Arc::new(made.files()?),
+            map: scene::MAP.to_owned(),
+            camera: Some(args.view.unwrap_or(scene::CAMERA)),
+        };
+        compare_on(args, subject, MapLightChoice::Prior)?;
+    }
+    Ok(())
+}
+
+/// The estimators beside the reference, with the frames of each.
+fn ways(args: &EstimatorsArgs, base: &Settings, reference: u32) -> Vec<(String, Settings, u32)> {
+    let with = |selection| Settings {
+        rt_light_selection: selection,
+        ..base.clone()
+    };
+    let way = |name: &str, settings| (name.to_owned(), settings, args.frames);
+    let mut ways = vec![
+        way("uniform", with(LightSelection::Uniform)),
+        way("resampled", with(LightSelection::Resampled)),
+        way("tree", with(LightSelection::Tree)),
+    ];
+    if base.rt_candidates > 1 {
+        let alone = Settings {
+            rt_candidates: 1,
+            ..with(LightSelection::Tree)
+        };
+        ways.push(way("tree, 1 candidate", alone));
+    }
+    ways.push(way("reused", with(LightSelection::Reused)));
+    if !args.no_unculled {
+        let one = Settings {
+            rt_cull_lights: false,
+            ..with(LightSelection::Resampled)
+        };
+        ways.push(way("one list", one));
         let all = Settings {
+            rt_cull_lights: false,
             rt_num_random_dl: 0,
             ..base.clone()
         };
-        let reference = args.reference.unwrap_or((args.frames / 16).max(16));
-        let truth = stage.render(&format!("{map} all"), &all, reference)?;
-        let print = |name: &str, rendered: &Rendered| {
-            let mut line = compare(&rendered.mean, &truth.mean, width as usize, args.tiles);
-            line["map"] = json!(map);
-            line["estimator"] = json!(name);
-            line["frames"] = json!(rendered.frames);
-            line["direct_ms"] = json!(rendered.time);
-            let early = rendered.early.iter().map(|(frames, p)| (*frames, p));
-            let noises = early
-                .chain([(rendered.frames, &rendered.mean)])
-                .map(|(frames, p)| {
-                    json!({
-                        "frames": frames,
-                        "noise": noise(p, &truth.mean, frames),
-                        "relative": relative_noise(p, &truth.mean, frames),
-                    })
-                });
-            line["noise"] = noises.collect();
-            if args.json {
-                println!("{line}");
-            } else {
-                row(&line);
-            }
+        ways.push(("all, not culled".to_owned(), all, reference));
+    }
+    let chosen =
+        |name: &str| args.only.is_empty() || args.only.iter().any(|only| name.starts_with(only));
+    ways.retain(|(name, ..)| chosen(name));
+    ways
+}
+
+/// Compares the estimators on a scene with these lights of the map.
+fn compare_on(args: &EstimatorsArgs, subject: Subject, lights: MapLightChoice) -> Result<()> {
+    let Subject {
+        name: map,
+        files,
+        map: path,
+        camera,
+    } = subject;
+    let base = Settings {
+        rt: Look::Traced,
+        rt_accumulate: true,
+        rt_auto_exposure: false,
+        // only light sampling may cause differences
+        rt_antialiasing: false,
+        rt_num_random_dl: 1,
+        rt_lights: lights,
+        ..Settings::full_size()
+    };
+    let base = (args.set).change([&args.bounces, &args.candidates], base);
+    let (width, height) = args.size;
+    let mut renderer = Renderer::new(RendererOptions {
+        device: args.device.clone(),
+        ..RendererOptions::headless(width, height)
+    })
+    .context("no picture without a Vulkan device")?;
+    let (bsp, entities) = load(&mut renderer, files, &path, &base)?;
+    let camera = (camera.or_else(|| Camera::of_map(&bsp)))
+        .context("the map has no place for a camera; set one with --view")?;
+    let mut stage = Stage {
+        renderer,
+        entities,
+        camera,
+        size: args.size,
+    };
+    let all = Settings {
+        rt_num_random_dl: 0,
+        rt_cull_lights: !args.unculled_reference,
+        ..base.clone()
+    };
+    let reference = args.reference.unwrap_or((args.frames / 16).max(16));
+    let truth = stage.render(&format!("{map} all"), &all, reference)?;
+    let print = |name: &str, rendered: &Rendered, structure: (u64, f64)| {
+        let mut line = compare(&rendered.mean, &truth.mean, width as usize, args.tiles);
+        line["map"] = json!(map);
+        line["estimator"] = json!(name);
+        line["frames"] = json!(rendered.frames);
+        line["direct_ms"] = json!(rendered.time);
+        line["structure_bytes"] = json!(structure.0);
+        line["structure_ms"] = json!(structure.1);
+        let early = rendered.early.iter().map(|(frames, p)| (*frames, p));
+        let noises = early
+            .chain([(rendered.frames, &rendered.mean)])
+            .map(|(frames, p)| {
+                json!({
+                    "frames": frames,
+                    "noise": noise(p, &truth.mean, frames),
+                    "relative": relative_noise(p, &truth.mean, frames),
+                })
+            });
+        line["noise"] = noises.collect();
+        if args.json {
+            println!("{line}");
+        } else {
+            row(&line);
+        }
+    };
+    let cost = |stage: &Stage| stage.renderer.light_cost().unwrap_or_default();
+    let lists = cost(&stage);
+    let of_lists = (lists.lists_bytes, lists.lists_ms);
+    if !args.json {
+        println!("{map}: {} lights", lists.lights);
+        println!(
+            "{:<18} {:>6} {:>11} {:>7} {:>11} {:>7} {:>9} {:>9} {:>9} {:>9} {:>10} {:>8} {:>9}",
+            "estimator",
+            "frames",
+            "difference",
+            "errors",
+            "worst tile",
+            "errors",
+            "noise 1",
+            "noise 16",
+            "noise all",
+            "direct ms",
+            "noise x ms",
+            "KiB",
+            "build ms"
+        );
+    }
+    print("all", &truth, of_lists);
+    for (name, settings, frames) in ways(args, &base, reference) {
+        let rendered = stage.render(&format!("{map} {name}"), &settings, frames)?;
+        let tree = cost(&stage).tree_bytes.zip(cost(&stage).tree_ms);
+        let structure = match settings.rt_light_selection {
+            LightSelection::Tree => tree.unwrap_or_default(),
+            _ => of_lists,
         };
-        if !args.json {
-            println!("{map}");
-            println!(
-                "{:<18} {:>6} {:>11} {:>7} {:>11} {:>7} {:>9} {:>9} {:>9} {:>9}",
-                "estimator",
-                "frames",
-                "difference",
-                "errors",
-                "worst tile",
-                "errors",
-                "noise 1",
-                "noise 16",
-                "noise all",
-                "direct ms"
-            );
-        }
-        print("all", &truth);
-        let with = |selection, cull, lights| Settings {
-            rt_light_selection: selection,
-            rt_cull_lights: cull,
-            rt_num_random_dl: lights,
-            ..base.clone()
-        };
-        let mut ways = vec![
-            (
-                "uniform",
-                with(LightSelection::Uniform, true, 1),
-                args.frames,
-            ),
-            (
-                "resampled",
-                with(LightSelection::Resampled, true, 1),
-                args.frames,
-            ),
-        ];
-        if !args.no_unculled {
-            ways.push((
-                "all, not culled",
-                with(LightSelection::Resampled, false, 0),
-                reference,
-            ));
-        }
-        for (name, settings, frames) in ways {
-            print(
-                name,
-                &stage.render(&format!("{map} {name}"), &settings, frames)?,
-            );
-        }
+        print(&name, &rendered, structure);
     }
     Ok(())
 }

@@ -7,7 +7,7 @@ mod axis;
 mod bound;
 mod fit;
 mod page;
-mod scene;
+pub(super) mod scene;
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -7,13 +7,14 @@ use super::{UNUSED, flags};
 use renderer_vk::settings::{Kind, PRESETS, Preset, Spec};
 
 /// Settings that exist to compare techniques. The page that compares them has their table, not that of players.
-const COMPARED: [&str; 6] = [
+const COMPARED: [&str; 7] = [
     "rt_gridCells",
     "rt_blueNoise",
     "rt_bounceScreen",
     "rt_bounceThickness",
     "rt_bounceAdaptive",
     "rt_bounceRoulette",
+    "rt_lightSelection",
 ];
 
 /// A row of a table. The help of variables without effect ends with a sentence that their table states once.

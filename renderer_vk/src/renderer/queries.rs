@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::Renderer;
 use crate::api::{MarkFragment, Orientation, PointLighting};
 use crate::error::Error;
-use crate::statistics::{Costs, StructureCost};
+use crate::statistics::{Costs, LightCost, StructureCost};
 use crate::trace::TraceLook;
 use crate::world::{LightsChanged, Marked, World};
 
@@ -110,6 +110,11 @@ impl Renderer {
     /// Cost of the map's structures; `None` without the traced look.
     pub fn structure_cost(&self) -> Option<StructureCost> {
         self.trace.as_ref().map(TraceLook::structure_cost)
+    }
+
+    /// Cost of the structures from which the map's lights are sampled; `None` if there are none.
+    pub fn light_cost(&self) -> Option<LightCost> {
+        self.trace.as_ref().map(TraceLook::light_cost)
     }
 
     /// Name of the loaded map, as given to [`load_world`](Self::load_world).

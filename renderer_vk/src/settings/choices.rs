@@ -29,12 +29,16 @@ impl Look {
 }
 
 numbered! {
-    /// How a traced light sample selects its light from a cell's list.
+    /// How a traced light sample selects its light.
     LightSelection {
         /// Resampled importance sampling among a few candidates.
         Resampled = 1,
         /// Each light with the same probability.
         Uniform = 0,
+        /// As `Resampled`, with candidates from a tree over all lights.
+        Tree = 2,
+        /// As `Resampled`, with the samples of neighbouring pixels and of the last frame.
+        Reused = 3,
     }
 }
 

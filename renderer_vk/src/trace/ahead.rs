@@ -1,21 +1,23 @@
 //! Which passes are compiled before a frame runs them, so that their pipelines are compiled at once and not one by one.
 
+use super::light_selection::{reuses_samples, samples_one_light};
 use super::pass_set::PassSet;
 use super::passes::{Pass, Switch};
-use super::view_tracer::samples_one_light;
-use super::{antialias, denoise, indirect, photons, screen};
+use super::{antialias, denoise, indirect, light_selection, photons, screen};
 use crate::gpu::Error;
 use crate::settings::{DenoiserChoice, Settings};
 
 /// Passes that the settings decide about, or that every frame runs, the slowest to compile first. Others are
 /// compiled when a frame first runs them.
-const AHEAD: [Pass; 39] = [
+const AHEAD: [Pass; 41] = [
     Pass::Primary,
     Pass::BounceShadeLast,
     Pass::BounceShade,
     Pass::Temporal,
     Pass::PrimarySimple,
     Pass::SampledDirect,
+    Pass::ReservoirReuse,
+    Pass::ReservoirSamples,
     Pass::Direct,
     Pass::Suns,
     Pass::BounceLight,
@@ -57,7 +59,10 @@ const FOG_AHEAD: [Pass; 2] = [Pass::FogLight, Pass::FogFilter];
 fn is_chosen(pass: Pass, settings: &Settings, needs: MapNeeds) -> bool {
     let gloss = needs.has_gloss(settings);
     match pass {
-        Pass::SampleLights | Pass::SampledDirect | Pass::Suns => samples_one_light(settings),
+        Pass::SampleLights | Pass::SampledDirect | Pass::Suns => {
+            samples_one_light(settings) && !reuses_samples(settings)
+        }
+        Pass::ReservoirSamples | Pass::ReservoirReuse => reuses_samples(settings),
         Pass::Direct => !samples_one_light(settings),
         Pass::BounceShade => {
             settings.rt_bounces > 1
@@ -130,6 +135,7 @@ fn states(pass: Pass, settings: &Settings, needs: MapNeeds) -> Vec<usize> {
             Switch::ScreenHits => screen::in_use(settings),
             Switch::Adaptive => indirect::is_adaptive(settings),
             Switch::Roulette => settings.rt_bounce_roulette,
+            Switch::LightTree => light_selection::uses_tree(settings),
         };
         if !on {
             continue;

@@ -119,6 +119,8 @@ pub struct Denoiser {
     history: bool,
     /// Off: history keeps its weight even if the light changes, as in SVGF. For comparisons.
     pub gradients: bool,
+    /// This frame's light can be repeated from its random numbers, and the settings want gradients.
+    repeats: bool,
 }
 
 impl Denoiser {
@@ -134,11 +136,12 @@ impl Denoiser {
             nothing: make(device, "trace no light", [1, 1], Format::Rgba32Uint)?,
             history: false,
             gradients: true,
+            repeats: true,
         })
     }
 
     /// Call before the parameters of a frame are collected. `size`: of the view, pixels; `goes_on`: the frame continues
-    /// the last drawn one, whose motion and camera are known.
+    /// the last drawn one, whose motion and camera are known; `gradients`: it has gradient samples.
     ///
     /// # Errors
     /// Out of memory.
@@ -147,7 +150,9 @@ impl Denoiser {
         mode: DenoiserChoice,
         size: [u32; 2],
         goes_on: bool,
+        gradients: bool,
     ) -> Result<(), Error> {
+        self.repeats = gradients;
         let tier = match mode {
             DenoiserChoice::None => None,
             DenoiserChoice::ASvgf => Some(Tier::Adaptive),
@@ -194,7 +199,7 @@ impl Denoiser {
 
     /// The images, if this frame has gradient samples.
     fn gradient_images(&self) -> Option<&Images> {
-        let wanted = self.history && self.gradients;
+        let wanted = self.history && self.gradients && self.repeats;
         self.images
             .as_ref()
             .filter(|i| wanted && i.tier == Tier::Adaptive)

@@ -11,13 +11,15 @@ use shaders::trace_types::constants as c;
 use shaders::types::Instance;
 use support::{Aabb, slice};
 
+use super::light_selection::{estimator, uses_tree};
+use super::light_tree::Emission;
 use super::lights::{
     ChangingLight, MapLights, count, number, sphere, sphere_bounds, triangle_bounds,
 };
 use crate::api::DynamicLight;
 use crate::gpu::{Error, Recorder};
 use crate::scene::{TracedScene, View};
-use crate::settings::{LightSelection, Settings};
+use crate::settings::Settings;
 
 /// Lights of a view, with the clusters that they reach.
 #[derive(Debug, Default)]
@@ -26,6 +28,17 @@ struct FrameLights {
     spheres: Vec<t::SphereLight>,
     /// Light numbers, with the clusters that each light can reach.
     reach: Vec<(u32, ClusterSet)>,
+    /// Lights of the tree over those that move or change: index in the tree, number, emission.
+    leafs: Vec<(usize, u32, Emission)>,
+}
+
+/// What finds a light of a brush model.
+#[derive(Clone, Copy)]
+enum Holder<'a> {
+    /// The lists of the clusters that it reaches.
+    Lists(&'a Sight),
+    /// The tree, from this index on.
+    Tree(usize),
 }
 
 /// Distance around a light within which its clusters are searched, units: leafs end at the surface of lamps.
@@ -59,6 +72,20 @@ impl FrameLights {
         Ok(())
     }
 
+    /// Adds the animated lights of the world, which are all lights so far, to those of the tree.
+    fn add_leafs(&mut self) {
+        let triangles = self.triangles.iter().enumerate().map(|(i, light)| {
+            let light_number = number(c::LIGHT_CHANGING_TRIANGLE, i);
+            (light_number, Emission::of_triangle(light))
+        });
+        let spheres = self.spheres.iter().enumerate().map(|(i, light)| {
+            let light_number = number(c::LIGHT_CHANGING_SPHERE, i);
+            (light_number, Emission::of_sphere(light))
+        });
+        let leafs = triangles.chain(spheres).enumerate();
+        self.leafs = leafs.map(|(at, (n, e))| (at, n, e)).collect();
+    }
+
     fn add_sphere(&mut self, light: t::SphereLight, sight: &Sight) {
         let margin = Vec3::splat(light.radius.max(SEARCH_MARGIN));
         let line = light.axis * light.half_length;
@@ -75,7 +102,7 @@ impl FrameLights {
         lights: &[ChangingLight],
         instance: &Instance,
         scale_of: impl Fn(&ChangingLight) -> f32,
-        sight: &Sight,
+        holder: Holder<'_>,
     ) {
         let place = |p: Vec3| {
             let [x, y, z] = instance.axis;
@@ -83,19 +110,29 @@ impl FrameLights {
         };
         let first = self.triangles.len();
         let mut bounds = Aabb::EMPTY;
-        for light in lights {
+        for (index, light) in lights.iter().enumerate() {
             let corners = light.light.corners.map(place);
             if !corners.iter().all(|p| p.is_finite()) {
                 continue;
             }
             bounds = bounds.union(Aabb::of(corners));
-            self.triangles.push(t::TriangleLight {
+            let present = t::TriangleLight {
                 corners,
                 radiance: light.light.radiance * scale_of(light),
                 flags: light.light.flags,
                 end: light.light.end * scale_of(light),
-            });
+            };
+            if let Holder::Tree(first_leaf) = holder {
+                let light_number = number(c::LIGHT_CHANGING_TRIANGLE, self.triangles.len());
+                let emission = Emission::of_triangle(&present);
+                self.leafs
+                    .push((first_leaf + index, light_number, emission));
+            }
+            self.triangles.push(present);
         }
+        let Holder::Lists(sight) = holder else {
+            return;
+        };
         if self.triangles.len() == first {
             return;
         }
@@ -158,9 +195,16 @@ impl MapLights {
         view: &TracedScene,
         settings: &Settings,
     ) -> Result<t::LightView, Error> {
+        let trees = match uses_tree(settings) {
+            true => Some(self.trees(&rec.device().clone())?),
+            false => None,
+        };
         let frame = self.frame_lights(view, settings);
         let mut lights = self.fixed();
         frame.upload(rec, self.sight.count(), &mut lights)?;
+        if let Some(trees) = trees {
+            trees.add_to(rec, &frame.leafs, &mut lights)?;
+        }
         if !settings.rt_cull_lights {
             // without a tree every point uses the last row, which holds all lights
             lights.node_count = 0;
@@ -170,11 +214,7 @@ impl MapLights {
         } else {
             0
         };
-        lights.selection = match settings.rt_light_selection {
-            _ if settings.rt_num_random_dl == 0 => c::SELECT_ALL,
-            LightSelection::Uniform => c::SELECT_UNIFORM,
-            LightSelection::Resampled => c::SELECT_RESAMPLED,
-        };
+        lights.selection = estimator(settings);
         // all lights are one estimate
         lights.samples = match settings.rt_num_random_dl {
             0 => 1,
@@ -212,11 +252,26 @@ impl MapLights {
                 .collect(),
             ..FrameLights::default()
         };
+        let has_tree = uses_tree(settings);
+        if has_tree {
+            frame.add_leafs();
+        }
+        let mut in_tree = Vec::new();
         for submodel in &view.look.submodels {
-            let lights = self.moving.iter().find(|(m, _)| *m == submodel.model);
+            let model = self.moving.iter().position(|(m, _)| *m == submodel.model);
+            let lights = model.and_then(|at| Some((at, &self.moving.get(at)?.1)));
             let instance = view.instances.get(submodel.instance as usize);
-            if let (Some((_, lights)), Some(instance)) = (lights, instance) {
-                frame.add_model(lights, instance, scale_of, &self.sight);
+            if let (Some((at, lights)), Some(instance)) = (lights, instance) {
+                // the tree has one place for each light of a model: further instances are in lists
+                let holder = if has_tree && !in_tree.contains(&at) {
+                    in_tree.push(at);
+                    let before = self.moving.iter().take(at).map(|(_, l)| l.len());
+                    let world = self.changing.len() + self.pulsing.len();
+                    Holder::Tree(world + before.sum::<usize>())
+                } else {
+                    Holder::Lists(&self.sight)
+                };
+                frame.add_model(lights, instance, scale_of, holder);
             }
         }
         if settings.dynamic_light {

@@ -40,6 +40,8 @@ pub struct FrameFacts {
     pub adaptive: bool,
     /// Paths may end where they have found light.
     pub roulette: bool,
+    /// Lights are drawn from a tree.
+    pub light_tree: bool,
 }
 
 impl FrameFacts {
@@ -55,6 +57,7 @@ impl FrameFacts {
             Switch::Caustics => self.photons > 0,
             Switch::Timed => self.timed,
             Switch::BlueNoise => self.blue_noise,
+            Switch::LightTree => self.light_tree,
         }
     }
 

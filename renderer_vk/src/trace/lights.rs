@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 use std::f32::consts::PI;
+use std::sync::OnceLock;
+use std::time::Instant;
 
 use glam::Vec3;
 use q3bsp::Bsp;
@@ -16,7 +18,10 @@ use super::cell_grid::CellGrid;
 use super::light_cells::Cells;
 use super::light_rows;
 use super::light_tables::luminance;
+use super::light_tree::Emission;
+use super::light_trees::LightTrees;
 use crate::gpu::{Buffer, BufferUsage, Device, Error};
+use crate::statistics::LightCost;
 
 /// Lights of a map, their lists, and the tree that finds the list of a point.
 pub struct MapLights {
@@ -36,6 +41,12 @@ pub struct MapLights {
     pub(super) moving: Vec<(u32, Vec<ChangingLight>)>,
     /// Distinct animations of lights.
     pub(super) flickers: Vec<Flicker>,
+    /// Trees over the lights; made when a frame first uses them.
+    trees: OnceLock<LightTrees>,
+    /// Constant triangle lights and point lights, for the tree.
+    constant: (Vec<t::TriangleLight>, Vec<t::SphereLight>),
+    /// Wall time of the lists, milliseconds, and their bytes.
+    lists_cost: (f64, u64),
     /// Radiance of a white diffuse surface in the map's ambient light.
     pub ambient: Vec3,
     /// Radiance that the map's exposure shows as white; display-encoded colours are scaled by it.
@@ -49,6 +60,8 @@ pub(super) struct ChangingLight {
     pub light: t::TriangleLight,
     /// Index of its animation.
     pub flicker: Option<usize>,
+    /// Origin of its model by the map's entities.
+    pub origin: Vec3,
 }
 
 /// A map's lights as the loader found them.
@@ -252,6 +265,18 @@ pub(super) fn point_light(light: &PointLight, end: f32) -> t::SphereLight {
     s
 }
 
+/// The point lights with those that pulse put out, so that indices stay.
+fn constant_points(
+    source: &MapLightSource<'_>,
+    mut spheres: Vec<t::SphereLight>,
+) -> Vec<t::SphereLight> {
+    let points = source.points.iter().zip(&mut spheres);
+    for (_, sphere) in points.filter(|(point, _)| point.pulse.is_some()) {
+        sphere.radiance = Vec3::ZERO;
+    }
+    spheres
+}
+
 /// Triangle lights by motion and animation.
 #[derive(Default)]
 struct SortedTriangles {
@@ -304,6 +329,7 @@ impl SortedTriangles {
         let mut placed = ChangingLight {
             light: triangle_light(light, end, origin),
             flicker,
+            origin,
         };
         if hittable {
             placed.light.flags |= c::LIGHT_HITTABLE;
@@ -367,7 +393,10 @@ impl MapLights {
             .map(|bsp| Cells::new(bsp, lists.clusters(), length));
         // A scene without a map has no cells.
         let cells = cells.unwrap_or_default();
+        let before = Instant::now();
         let (rows, slots) = light_rows::rows(source, &sorted.numbers, &cells);
+        let bytes = size_of_val(rows.as_slice()) + size_of_val(slots.as_slice());
+        let lists_cost = (before.elapsed().as_secs_f64() * 1000.0, bytes as u64);
         // Without a map as above.
         let bounds = source.bsp.and_then(|bsp| bsp.models.first());
         let (low, high) = bounds
@@ -416,6 +445,9 @@ impl MapLights {
                 .collect(),
             moving: sorted.moving,
             flickers: sorted.flickers,
+            trees: OnceLock::new(),
+            constant: (sorted.triangles, constant_points(source, spheres)),
+            lists_cost,
             ambient: source.ambient,
             white: 1.0,
         })
@@ -441,6 +473,61 @@ impl MapLights {
         move |fog| {
             let reach = self.fog_reach.get(fog).zip(cluster);
             reach.is_none_or(|(reach, cluster)| reach.contains(cluster))
+        }
+    }
+
+    /// The trees over the map's lights; built at the first call.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub(super) fn trees(&self, device: &Device) -> Result<&LightTrees, Error> {
+        if let Some(made) = self.trees.get() {
+            return Ok(made);
+        }
+        let (triangles, spheres) = &self.constant;
+        let triangles = triangles.iter().map(Emission::of_triangle).enumerate();
+        let spheres = spheres.iter().map(Emission::of_sphere).enumerate();
+        let constant: Vec<(u32, Emission)> = triangles
+            .map(|(i, emission)| (number(c::LIGHT_TRIANGLE, i), emission))
+            .chain(spheres.map(|(i, emission)| (number(c::LIGHT_SPHERE, i), emission)))
+            .filter(|(_, emission)| *emission != Emission::NOTHING)
+            .collect();
+        let made = LightTrees::new(device, &constant, &self.changing_emissions())?;
+        Ok(self.trees.get_or_init(|| made))
+    }
+
+    /// The lights that move or change, at mean strength and at their initial positions: animated triangles, animated
+    /// points, then those of the brush models in the order of `moving`. Frames give them their numbers.
+    fn changing_emissions(&self) -> Vec<(u32, Emission)> {
+        let of_models = self.moving.iter().flat_map(|(_, lights)| lights);
+        let at_origin = |light: &ChangingLight| t::TriangleLight {
+            corners: light.light.corners.map(|p| p + light.origin),
+            ..light.light
+        };
+        let changing = (self.changing.iter()).map(|light| Emission::of_triangle(&light.light));
+        let pulsing = self.pulsing.iter().map(|p| Emission::of_sphere(&p.0));
+        let models = of_models.map(|light| Emission::of_triangle(&at_origin(light)));
+        let all = changing.chain(pulsing).chain(models);
+        all.map(|emission| (0, emission)).collect()
+    }
+
+    /// Number of the animated triangle lights and points of the world: the first of those that frames upload.
+    pub(super) fn lasting(&self) -> [u32; 2] {
+        [count(self.changing.len()), count(self.pulsing.len())]
+    }
+
+    /// Costs of the lists, and of the trees if a frame has used them.
+    pub fn cost(&self) -> LightCost {
+        let trees = self.trees.get();
+        LightCost {
+            lights: self.constant.0.len()
+                + self.constant.1.len()
+                + self.changing.len()
+                + self.moving.iter().map(|(_, l)| l.len()).sum::<usize>(),
+            lists_ms: self.lists_cost.0,
+            lists_bytes: self.lists_cost.1,
+            tree_ms: trees.map(|trees| trees.build_ms),
+            tree_bytes: trees.map(|trees| trees.bytes),
         }
     }
 

@@ -29,7 +29,7 @@ use crate::gpu::{ColorMask, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
 use crate::scene::TracedScene;
 use crate::settings::Settings;
-use crate::statistics::StructureCost;
+use crate::statistics::{LightCost, StructureCost};
 use crate::world::World;
 
 /// Sort value of the engine's first class of blended surfaces (`SS_BLEND0`).
@@ -263,7 +263,10 @@ impl TraceLook {
         lights.white = self.lights.white;
         lights.find_fogs(&self.geometry.fog_boxes);
         self.lights = lights;
-        self.tracer.forget_accumulated();
+        let right = self.right.as_deref_mut();
+        for tracer in [&mut self.tracer].into_iter().chain(right) {
+            tracer.forget_accumulated();
+        }
         Ok(())
     }
 
@@ -406,6 +409,11 @@ impl TraceLook {
     /// Rays of a pass in the newest finished frame; `None` for a pass without a counter, or while rays are not counted.
     pub fn rays(&self, pass: &str) -> Option<u64> {
         self.tracer.rays()?.get(counter_of(pass)?).copied()
+    }
+
+    /// Cost of the structures of the map's constant geometry.
+    pub fn light_cost(&self) -> LightCost {
+        self.lights.cost()
     }
 
     /// Cost of the structures of the map's constant geometry.

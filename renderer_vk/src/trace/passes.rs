@@ -8,6 +8,8 @@ use shaders::constant_ids::trace as ids;
 use shaders::trace_types::constants as t;
 use shaders::{RayShader, Spirv};
 
+pub use super::resource::Resource;
+
 /// A shader of a pass.
 #[derive(Clone, Copy, Debug)]
 pub enum Shader {
@@ -67,125 +69,8 @@ pub enum Switch {
     Adaptive,
     /// Paths of bounces may end where they have found light.
     Roulette,
-}
-
-/// Data that passes exchange within a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Resource {
-    /// Acceleration structures, geometry, materials and positions of the last frame; ready before the passes.
-    Scene,
-    /// Light lists, lights and suns; ready before the passes.
-    Lights,
-    /// First hits of the camera's rays.
-    PrimaryHits,
-    /// Motion and view distance of the surface that a pixel shows.
-    GBuffer,
-    /// Its position.
-    Positions,
-    /// Its normals.
-    Normals,
-    /// Albedo of that surface, and the radiance in front of it.
-    Shown,
-    /// The same for the alternate side of a reflecting or transparent surface.
-    Other,
-    /// Weight of the light in fog.
-    FogWeights,
-    /// Points in fog to be lit.
-    FogPoints,
-    /// Visibility of flares.
-    FlareStates,
-    /// Photons where they have landed.
-    Photons,
-    /// The grid that holds them.
-    PhotonCells,
-    /// Pixels that shade a surface of the last frame again.
-    GradientPixels,
-    /// For each pixel, the light that its shadow ray tests.
-    SampledLights,
-    /// Direct light without albedo; the denoiser leaves the sum of all filtered light here.
-    DirectLight,
-    /// Cells of 2 × 2 pixels that gather bounced light.
-    AskedCells,
-    /// What the rays of a bounce hit.
-    BounceHits,
-    /// Hits of bounce rays in the last frame's picture.
-    ScreenHits,
-    /// Albedo and emission of the first surface of each pixel, for the bounces of the next frame.
-    ScreenSurfaces,
-    /// Its light and distance.
-    ScreenLight,
-    /// For each of those hits, the light that its shadow ray tests, and the path that goes on from there.
-    BounceLights,
-    /// Bounced light without albedo.
-    IndirectLight,
-    /// Specular reflection of the surface that a pixel shows.
-    GlossSurfaces,
-    /// Its light, without the reflectance.
-    GlossLight,
-    /// The same, joined with that of earlier frames.
-    GlossHistory,
-    /// Light at the points in fog.
-    FogLight,
-    /// The same, filtered.
-    FilteredFogLight,
-    /// Change of light at the gradient pixels.
-    GradientSamples,
-    /// The same, filtered over neighbouring strata.
-    GradientSums,
-    /// The changed part of light in each stratum.
-    Gradients,
-    /// Change of depth from pixel to pixel.
-    DepthGradient,
-    /// Number of frames and variance of the light.
-    Past,
-    /// Light of this and earlier frames, being filtered.
-    FreshLight,
-    /// Filtered light for the next frame.
-    LightHistory,
-    /// Radiance of the traced size.
-    Picture,
-    /// Radiance of the output's size, resolved over frames or upscaled.
-    ResolvedPicture,
-    /// Histogram of luminance.
-    Histogram,
-    /// Exposure.
-    Exposure,
-    /// Levels of bloom.
-    BloomLevels,
-    /// Their sum.
-    Bloom,
-    /// The view's rectangle of the frame's image.
-    Target,
-    /// Hybrid look: normals and depths of the map's surfaces; drawn before the passes.
-    HybridSurfaces,
-    /// Hybrid look: occlusion by models, and hidden dynamic lights.
-    HybridTraced,
-    /// The same, filtered; read by the draws of the map.
-    HybridTexels,
-    /// Hybrid look: the mirrored scene; read by the draws of environment images.
-    HybridReflections,
-}
-
-impl Resource {
-    /// Representative of the resources that share memory with this one: writing one of them destroys the others.
-    pub fn memory(self) -> Self {
-        match self {
-            Self::SampledLights
-            | Self::BounceHits
-            | Self::ScreenHits
-            | Self::BounceLights
-            | Self::GradientSamples
-            | Self::GradientSums
-            | Self::FreshLight => Self::PrimaryHits,
-            Self::Past => Self::IndirectLight,
-            Self::DepthGradient => Self::DirectLight,
-            Self::Normals => Self::Picture,
-            Self::FogPoints => Self::FogLight,
-            Self::FilteredFogLight => Self::Positions,
-            Self::Other => Self::ResolvedPicture,
-            other => other,
-        }
-    }
+    /// Lights are drawn from a tree (`rt_lightSelection 2`).
+    LightTree,
 }
 
 /// Declaration of a pass.
@@ -246,7 +131,7 @@ macro_rules! passes {
         /// Declarations, in the order of [`Pass`].
         pub static TABLE: &[Row] = {
             #[allow(clippy::enum_glob_use)] // rows name many of them
-            use {Resource::*, Shader::{Compute, Rays}, Switch::{Adaptive, BlueNoise, Bounces, Caustics, Gloss, LitFog, MapFog, Roulette, Timed}};
+            use {Resource::*, Shader::{Compute, Rays}, Switch::{Adaptive, BlueNoise, Bounces, Caustics, Gloss, LightTree, LitFog, MapFog, Roulette, Timed}};
             &[$(Row { $($field: $value,)* ..Row::of(concat!($($about),+), $name, $shader, Size::$size) }),+]
         };
     };
@@ -294,7 +179,7 @@ passes! {
     }
     /// Photons from lamps and suns through refracting bodies (`rt_caustics`).
     Photons = "trace_photons", Rays(&shaders::TRACE_PHOTONS), Photons {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::lights::LIGHT_TREE, LightTree)],
         reads: &[Scene, Lights],
         writes: &[Photons],
         counter: Some(t::COUNT_PHOTONS),
@@ -311,7 +196,7 @@ passes! {
     }
     /// Samples one light for each pixel, and sorts the rays of a tile by direction.
     SampleLights = "trace_sample_lights", Compute(&shaders::TRACE_SAMPLE_LIGHTS_COMP), Traced {
-        switches: &[(ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
+        switches: &[(ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::lights::LIGHT_TREE, LightTree)],
         reads: &[Lights, GBuffer, Positions, Normals],
         may_read: &[GradientPixels],
         writes: &[SampledLights],
@@ -334,9 +219,24 @@ passes! {
         writes: &[DirectLight],
         counter: Some(t::COUNT_SUNS),
     }
+    /// A light sample for each pixel, tested by a ray and joined with that of the last frame (`rt_lightSelection 3`).
+    ReservoirSamples = "trace_direct", Rays(&shaders::TRACE_RESERVOIR_SAMPLES), Traced {
+        switches: &[(ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
+        reads: &[Scene, Lights, GBuffer, Positions, Normals],
+        writes: &[Reservoirs],
+        counter: Some(t::COUNT_DIRECT),
+    }
+    /// Joins the samples of neighbouring pixels; light of the result, and of a sun.
+    ReservoirReuse = "trace_direct", Rays(&shaders::TRACE_RESERVOIR_REUSE), Traced {
+        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
+        reads: &[Scene, Lights, GBuffer, Positions, Normals, Reservoirs],
+        may_read: &[PhotonCells],
+        writes: &[DirectLight],
+        counter: Some(t::COUNT_DIRECT),
+    }
     /// Direct light where a pixel samples several lights or all.
     Direct = "trace_direct", Rays(&shaders::TRACE_DIRECT), Traced {
-        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
+        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::lights::LIGHT_TREE, LightTree)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals],
         may_read: &[GradientPixels, PhotonCells],
         writes: &[DirectLight],
@@ -344,7 +244,7 @@ passes! {
     }
     /// Light that flat mirrors of the map reflect onto the surfaces from which a bounce starts.
     MirrorLight = "trace_mirror_light", Rays(&shaders::TRACE_MIRROR_LIGHT), Cells {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::subsample::ADAPTIVE, Adaptive)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::subsample::ADAPTIVE, Adaptive), (ids::lights::LIGHT_TREE, LightTree)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals],
         may_read: &[GradientPixels, BounceLights, AskedCells],
         writes: &[BounceLights],
@@ -372,7 +272,7 @@ passes! {
     }
     /// Shades what they hit, and samples a light for it.
     BounceShade = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
-        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive)],
+        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive), (ids::lights::LIGHT_TREE, LightTree)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
         may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells, AskedCells],
         writes: &[BounceLights, GlossSurfaces],
@@ -380,7 +280,7 @@ passes! {
     /// The same of the last bounce, after which no path goes on.
     BounceShadeLast = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
         constants: &[(ids::bounce::LAST_BOUNCE, 1)],
-        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive)],
+        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive), (ids::lights::LIGHT_TREE, LightTree)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
         may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells, AskedCells],
         writes: &[BounceLights, GlossSurfaces],
@@ -396,7 +296,7 @@ passes! {
     /// Specular light of sampled lights at rough surfaces. The passes of a bounce then trace its other paths.
     SpecularLight = "trace_specular_light", Rays(&shaders::TRACE_SPECULAR_LIGHT), Cells {
         constants: &[(ids::specular::HAS_GLOSS, 1)],
-        switches: &[(ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
+        switches: &[(ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::lights::LIGHT_TREE, LightTree)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, GlossSurfaces],
         writes: &[BounceLights],
         counter: Some(t::COUNT_SPECULAR),
@@ -476,6 +376,7 @@ passes! {
     }
     /// Light at the points in fog.
     FogLight = "trace_fog", Rays(&shaders::TRACE_FOG_LIGHT), FogCells {
+        switches: &[(ids::lights::LIGHT_TREE, LightTree)],
         reads: &[Scene, Lights, FogPoints],
         writes: &[FogLight],
     }

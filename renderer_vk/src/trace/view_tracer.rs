@@ -19,19 +19,21 @@ use super::frame_passes::{FrameFacts, FramePasses};
 use super::geometry::StaticGeometry;
 use super::indirect;
 use super::input::MaterialTable;
+use super::light_selection::{is_lit, reuses_samples, samples_one_light, uses_tree};
 use super::lights::MapLights;
 use super::motion::Motion;
 use super::pass_set::PassSet;
 use super::passes::{COUNTERS, Pass, Resource};
 use super::photons::{self, Photons};
 use super::pixel_times::PixelTimes;
+use super::reservoirs::Reservoirs;
 use super::screen::LastScreen;
 use super::specular::SpecularTable;
 use super::targets::{OwnImages, Targets};
 use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
 use crate::scene::TracedScene;
-use crate::settings::{DebugOutput, DenoiserChoice, LightSelection, Settings};
+use crate::settings::{DebugOutput, DenoiserChoice, Settings};
 use crate::world::outside;
 use content::content_hash;
 use parameters::{Prepared, camera_frame, portal_record};
@@ -78,6 +80,7 @@ pub struct ViewTracer {
     blue_noise: BlueNoise,
     screen: LastScreen,
     pub(super) photons: Photons,
+    reservoirs: Reservoirs,
     counters: RayCounters,
     pixel_times: PixelTimes,
     specular_table: SpecularTable,
@@ -131,6 +134,7 @@ impl ViewTracer {
             blue_noise: BlueNoise::default(),
             screen: LastScreen::default(),
             photons: Photons::default(),
+            reservoirs: Reservoirs::default(),
             counters: RayCounters::default(),
             pixel_times: PixelTimes::default(),
             specular_table: SpecularTable::default(),
@@ -193,9 +197,10 @@ impl ViewTracer {
         self.joining = frames;
     }
 
-    /// Discards accumulated frames.
+    /// Discards accumulated frames and light samples: lights have changed.
     pub fn forget_accumulated(&mut self) {
         self.accumulated = (0, 0);
+        self.reservoirs.forget();
     }
 
     /// Discards accumulated frames and restarts exposure, after a change of map.
@@ -263,6 +268,7 @@ impl ViewTracer {
         self.last_time = view.scene.time;
         self.history = (!settings.rt_accumulate).then(|| camera_frame(view.scene));
         self.denoiser.advance();
+        self.reservoirs.advance();
         self.fog.advance();
         targets.advance();
         self.antialias.advance();
@@ -289,8 +295,12 @@ impl ViewTracer {
         let size = [targets.width, targets.height];
         let goes_on = self.history.is_some();
         let denoiser = denoise::in_use(settings);
-        self.denoiser.prepare(denoiser, size, goes_on)?;
+        let reuses = reuses_samples(settings);
+        let gradients = settings.rt_gradients && !reuses;
+        (self.denoiser).prepare(denoiser, size, goes_on, gradients)?;
         (self.denoiser).prepare_cells(indirect::is_adaptive(settings), size)?;
+        let lasting = reuses && !settings.rt_accumulate;
+        (self.reservoirs).prepare(&self.device, reuses, lasting, size, goes_on)?;
         let has_fog = map.is_some_and(|m| fog_in_sight(&m, scene));
         self.fog.prepare(
             has_fog && is_lit(settings),
@@ -368,7 +378,11 @@ impl ViewTracer {
         }
         self.photons.record(passes)?;
         self.denoiser.reproject_gradients(passes)?;
-        light_directly(passes, settings, params)?;
+        if self.reservoirs.is_on() {
+            self.reservoirs.record(passes)?;
+        } else {
+            light_directly(passes, settings, params)?;
+        }
         if facts.bounces {
             indirect::record(passes, &params.transport, settings.rt_samples)?;
         } else {
@@ -418,6 +432,7 @@ impl ViewTracer {
             screen: self.screen.is_known(),
             adaptive: indirect::is_adaptive(settings),
             roulette: settings.rt_bounce_roulette,
+            light_tree: uses_tree(settings),
         }
     }
 
@@ -493,14 +508,6 @@ fn light_directly(
     Ok(())
 }
 
-/// Whether each pixel samples a single light, in a pass of its own.
-pub fn samples_one_light(settings: &Settings) -> bool {
-    is_lit(settings)
-        && settings.rt_light_selection == LightSelection::Resampled
-        && settings.rt_num_random_dl == 1
-        && settings.rt_samples == 1
-}
-
 /// Clears bounced light, unless it is black. The adaptive denoiser, whose image holds other data meanwhile, does not
 /// read it.
 fn clear_indirect(targets: &mut Targets, passes: &mut FramePasses<'_>) -> Result<(), Error> {
@@ -540,9 +547,4 @@ fn fog_in_sight(map: &TracedMap<'_>, view: &TracedScene) -> bool {
 /// Whether rough surfaces and normal maps are in use. Frosted glass is clear in live frames.
 fn has_gloss(materials: &dyn MaterialTable, settings: &Settings) -> bool {
     settings.rt_specular && is_lit(settings) && materials.has_gloss(settings.rt_accumulate)
-}
-
-/// Whether surfaces are lit; otherwise they show their albedo.
-fn is_lit(settings: &Settings) -> bool {
-    settings.rt_illumination && !settings.fullbright
 }

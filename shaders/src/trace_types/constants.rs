@@ -143,6 +143,9 @@ pub const SELECT_UNIFORM: u32 = 0;
 pub const SELECT_RESAMPLED: u32 = 1;
 pub const SELECT_ALL: u32 = 2;
 
+/// Bits of `ReservoirView::flags`: the samples of the last frame are valid.
+pub const RESERVOIRS_HISTORY: u32 = 1;
+
 /// `SELECT_ALL`: a light whose part of a point's estimated light is the inverse of this or more has a ray of its own.
 pub const ALL_RAYS: u32 = 64;
 /// `SELECT_ALL`: rays to lights that a cell's row does not state.
@@ -218,6 +221,8 @@ pub const STREAM_PATH: u32 = 4096;
 pub const STREAM_SPECULAR: u32 = 4000;
 /// Photons, by number instead of by pixel.
 pub const STREAM_PHOTONS: u32 = 4001;
+/// Reuse of the light samples of neighbours.
+pub const STREAM_REUSE: u32 = 4002;
 
 /// `PassStep::part` of a bounce: bit of the paths that start at rough surfaces; number of the first bit of the path's
 /// number; below it the pixel of the cell.

@@ -117,6 +117,26 @@ pub struct LightRow {
     pub cluster: u32,
 }
 
+/// A node of a tree over lights.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct LightTreeNode {
+    /// Centre of the box around its lights.
+    pub centre: Vec3,
+    /// Radius of the sphere around the box.
+    pub radius: f32,
+    /// Middle of the cone of the normals of its lights.
+    pub axis: Vec3,
+    /// Cosine of the half angle of the cone; -1: all directions.
+    pub cos_spread: f32,
+    /// Sum of the luminances of the radiant intensities of its lights along their normals, over pi.
+    pub power: f32,
+    /// First of its two children, which are adjacent; 0: a leaf.
+    pub first: u32,
+    /// Number of a leaf's light.
+    pub light: u32,
+}
+
 /// Light list of a cluster for lights of this frame: entries of `LightView::dynamic_lights`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
@@ -135,6 +155,22 @@ pub struct BspNode {
     pub plane: [f32; 4],
     /// Front and back child: a node, or `-1 - leaf`.
     pub children: [i32; 2],
+}
+
+/// Light samples that one frame leaves to the next.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct ReservoirView {
+    /// Two texels of 16 bytes a pixel (`reservoirs.glsl`); 0: none are kept.
+    pub history: u64,
+    /// `RESERVOIRS_*` bits.
+    pub flags: u32,
+    /// Number of changing triangle lights that keep their numbers: they are the first.
+    pub lasting_triangles: u32,
+    /// The same of changing sphere lights.
+    pub lasting_spheres: u32,
+    /// To a multiple of eight bytes.
+    pub padding: u32,
 }
 
 /// Light lists of a view. Arrays of two or four are indexed by kind of light (`LIGHT_*`).
@@ -166,6 +202,10 @@ pub struct LightView {
     pub emitted: u64,
     /// Start of the BSP walk for each box of a grid over the map (`i32`: a node, or `-1 - leaf`).
     pub grid: u64,
+    /// [`LightTreeNode`]s over the map's constant lights, root first; 0: the lists are used.
+    pub tree: u64,
+    /// The same over lights that move or change, in their present state.
+    pub changing_tree: u64,
     /// Number of nodes; 0: every point lies in no cluster.
     pub node_count: u32,
     /// Number of cells.
@@ -194,4 +234,8 @@ pub struct LightView {
     pub ambient: Vec3,
     /// Number of surfaces in `emitted`.
     pub emitted_count: u32,
+    /// Number of nodes of `tree`.
+    pub tree_nodes: u32,
+    /// Number of nodes of `changing_tree`.
+    pub changing_tree_nodes: u32,
 }

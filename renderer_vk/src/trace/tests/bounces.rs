@@ -220,18 +220,24 @@ fn a_bounce_has_one_ray_for_lamps_and_sun(gpu: &mut Gpu) {
         scene.point(Vec3::new(60.0, y, 60.0), 3000.0 + 10.0 * y, 4.0);
     }
     scene.sun(Vec3::new(-0.5, 0.2, 0.8).normalize(), 4.0, 0.02);
-    let [uniform, resampled] =
-        [LightSelection::Uniform, LightSelection::Resampled].map(|selection| {
-            let settings = Settings {
-                rt_light_selection: selection,
-                ..bounced(1)
-            };
-            let direct = Settings {
-                rt_bounces: 0,
-                ..settings.clone()
-            };
-            gpu.mean(&scene, &settings, 256).x - gpu.mean(&scene, &direct, 256).x
-        });
+    let [uniform, resampled, tree] = [
+        LightSelection::Uniform,
+        LightSelection::Resampled,
+        LightSelection::Tree,
+    ]
+    .map(|selection| {
+        let settings = Settings {
+            rt_light_selection: selection,
+            ..bounced(1)
+        };
+        let direct = Settings {
+            rt_bounces: 0,
+            ..settings.clone()
+        };
+        gpu.mean(&scene, &settings, 256).x - gpu.mean(&scene, &direct, 256).x
+    });
+    println!("{tree} from a tree");
+    assert!((tree / uniform - 1.0).abs() < 0.03, "{uniform} {tree}");
     let [reference, live] = by_each_way(gpu, &scene, &bounced(1), 256);
     println!("as a game shows it: {}", live.x / reference.x);
     assert!((live.x / reference.x - 1.0).abs() < 0.02);

@@ -35,12 +35,21 @@ enum LightSampling {
     Uniform,
     Resampled,
     All,
+    Tree,
 }
 
-const ALL: [LightSampling; 3] = [
+/// Those that sample lists of lights.
+const OF_LISTS: [LightSampling; 3] = [
     LightSampling::Uniform,
     LightSampling::Resampled,
     LightSampling::All,
+];
+
+const ALL: [LightSampling; 4] = [
+    LightSampling::Uniform,
+    LightSampling::Resampled,
+    LightSampling::All,
+    LightSampling::Tree,
 ];
 
 /// A white floor and a slanted camera.
@@ -54,10 +63,10 @@ fn floor() -> Scene {
 fn sampled(sampling: LightSampling) -> Settings {
     Settings {
         rt_num_random_dl: if sampling == LightSampling::All { 0 } else { 4 },
-        rt_light_selection: if sampling == LightSampling::Uniform {
-            LightSelection::Uniform
-        } else {
-            LightSelection::Resampled
+        rt_light_selection: match sampling {
+            LightSampling::Uniform => LightSelection::Uniform,
+            LightSampling::Tree => LightSelection::Tree,
+            LightSampling::Resampled | LightSampling::All => LightSelection::Resampled,
         },
         ..reference()
     }
@@ -86,15 +95,17 @@ fn one_triangle_gives_the_irradiance_of_the_closed_form(gpu: &mut Gpu) {
     ] {
         let mut scene = floor();
         scene.light(triangle, Vec3::splat(5.0));
-        let (pixels, _) = gpu.render(&scene, &sampled(LightSampling::Resampled), 64);
         let exact: Vec<f32> = floor_points(&scene)
             .map(|p| lambert(p, Vec3::Z, triangle, 5.0))
             .collect();
-        let difference = mean_difference(&pixels, exact.iter().copied());
-        let ratio = pixels.iter().map(|p| p.x).sum::<f32>() / exact.iter().sum::<f32>();
-        println!("mean relative difference {difference}, ratio {ratio}");
-        assert!(difference < 0.002, "{difference}");
-        assert!((ratio - 1.0).abs() < 0.0005, "{ratio}");
+        for sampling in [LightSampling::Resampled, LightSampling::Tree] {
+            let (pixels, _) = gpu.render(&scene, &sampled(sampling), 64);
+            let difference = mean_difference(&pixels, exact.iter().copied());
+            let ratio = pixels.iter().map(|p| p.x).sum::<f32>() / exact.iter().sum::<f32>();
+            println!("{sampling:?}: mean relative difference {difference}, ratio {ratio}");
+            assert!(difference < 0.002, "{difference}");
+            assert!((ratio - 1.0).abs() < 0.0005, "{ratio}");
+        }
         // no light behind a one-sided light
         let mut scene = floor();
         scene.light([triangle[0], triangle[2], triangle[1]], Vec3::splat(5.0));
@@ -378,7 +389,7 @@ fn a_point_is_lit_by_the_list_of_its_cluster(gpu: &mut Gpu) {
         shares: Vec::new(),
     };
     scene.tree = Some((bsp, lists));
-    for sampling in ALL {
+    for sampling in OF_LISTS {
         let (pixels, _) = gpu.render(&scene, &sampled(sampling), 4);
         for (pixel, p) in pixels.iter().zip(floor_points(&scene)) {
             // a pixel is four units wide
@@ -407,14 +418,17 @@ fn points_pulse_with_their_style(gpu: &mut Gpu) {
     scene.point(at[1], 3000.0, 4.0);
     for (time, strength) in [(250, 1.0), (750, 0.0)] {
         scene.def.time_ms = time;
-        let (pixels, _) = gpu.render(&scene, &sampled(LightSampling::All), 32);
         let given = |p: Vec3, at: Vec3| {
             let offset = at - p;
             at.z / offset.length().powi(3) / std::f32::consts::PI
         };
         let exact = |p| strength * 7000.0 * given(p, at[0]) + 3000.0 * given(p, at[1]);
-        let difference = mean_difference(&pixels, floor_points(&scene).map(exact));
-        assert!(difference < 0.01, "{time}: {difference}");
+        for (sampling, bound) in [(LightSampling::All, 0.01), (LightSampling::Tree, 0.02)] {
+            let (pixels, _) = gpu.render(&scene, &sampled(sampling), 64);
+            let difference = mean_difference(&pixels, floor_points(&scene).map(exact));
+            println!("{sampling:?}, {time} ms: {difference}");
+            assert!(difference < bound, "{sampling:?}, {time}: {difference}");
+        }
     }
 }
 

@@ -17,6 +17,7 @@ gpu_tests! {
         in_a_furnace_of_sky_a_white_floor_is_as_bright_as_the_sky,
         the_flashlight_lights_a_spot_before_the_camera,
         estimators_differ_by_noise_alone,
+        a_tree_finds_each_light_from_within_its_nodes,
         a_chosen_ray_goes_where_it_was_sent,
         errors_fall_faster_than_those_of_independent_frames,
     ],
@@ -25,7 +26,7 @@ gpu_tests! {
     ],
 }
 
-const SIDE: usize = 32;
+pub(super) const SIDE: usize = 32;
 
 /// A white floor from above, `half` units to each side.
 fn floor_from_above(half: f32) -> Scene {
@@ -46,7 +47,7 @@ fn floor_below_an_edge() -> Scene {
     scene
 }
 
-fn all_lights() -> Settings {
+pub(super) fn all_lights() -> Settings {
     Settings {
         rt_num_random_dl: 0,
         rt_antialiasing: false,
@@ -237,18 +238,44 @@ fn lights_of_a_brush_model_go_where_it_goes(gpu: &mut Gpu) {
         scene
             .submodels
             .push(crate::scene::Submodel { model: 1, instance });
-        let (pixels, _) = gpu.render(&scene, &all_lights(), 32);
-        let exact: f32 = floor_points(&scene)
-            .map(|p| lambert(p, Vec3::Z, triangle.map(|c| c + moved), 50.0))
-            .sum();
-        let ratio = pixels.iter().map(|p| p.x).sum::<f32>() / exact;
-        println!("{ratio}");
-        assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
+        let from_tree = Settings {
+            rt_light_selection: LightSelection::Tree,
+            rt_num_random_dl: 1,
+            ..all_lights()
+        };
+        for settings in [all_lights(), from_tree] {
+            let (pixels, _) = gpu.render(&scene, &settings, 32);
+            let exact: f32 = floor_points(&scene)
+                .map(|p| lambert(p, Vec3::Z, triangle.map(|c| c + moved), 50.0))
+                .sum();
+            let ratio = pixels.iter().map(|p| p.x).sum::<f32>() / exact;
+            println!("{:?}: {ratio}", settings.rt_light_selection);
+            assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
+        }
+        // a second instance of the model has the same lights, which the tree has once
+        let second = Instance {
+            origin: moved + Vec3::new(-20.0, 30.0, 0.0),
+            ..identity()
+        };
+        let number = scene.instances.len() as u32;
+        scene.instances.push(second);
+        scene.submodels.push(crate::scene::Submodel {
+            model: 1,
+            instance: number,
+        });
+        let from_tree = Settings {
+            rt_light_selection: LightSelection::Tree,
+            rt_num_random_dl: 4,
+            ..all_lights()
+        };
+        let [truth, drawn] = [all_lights(), from_tree].map(|s| gpu.mean(&scene, &s, 64).x);
+        println!("two instances: {}", drawn / truth);
+        assert!((drawn / truth - 1.0).abs() < 0.01, "{truth} {drawn}");
     }
 }
 
 /// Many lights of all kinds between pillars.
-fn crowd() -> Scene {
+pub(super) fn crowd() -> Scene {
     let mut scene = Scene::hall(60.0, 0.7, SIDE as i32);
     for i in 0..40 {
         let angle = i as f32 * 2.4;
@@ -324,7 +351,11 @@ fn estimators_differ_by_noise_alone(gpu: &mut Gpu) {
     let scene = crowd();
     let (truth, _) = gpu.render(&scene, &all_lights(), 16);
     let in_cells = crowd_in_cells();
-    for selection in [LightSelection::Uniform, LightSelection::Resampled] {
+    for selection in [
+        LightSelection::Uniform,
+        LightSelection::Resampled,
+        LightSelection::Tree,
+    ] {
         // one sample per pixel has a pass of its own
         for (candidates, samples, frames) in [(3, 16, 12), (8, 16, 12), (8, 1, 192)] {
             let settings = Settings {
@@ -342,6 +373,70 @@ fn estimators_differ_by_noise_alone(gpu: &mut Gpu) {
     }
     let (pixels, _) = gpu.render(&in_cells, &all_lights(), 48);
     differs_by_noise_alone(&pixels, &truth, "all lights of cells");
+}
+
+/// Triangles of all directions and point lights throughout a hall, so that surfaces lie within the nodes of a tree over
+/// them; some belong to brush models.
+pub(super) fn cloud() -> Scene {
+    let mut scene = Scene::hall(60.0, 0.7, SIDE as i32);
+    let part = |n: u32| (f64::from(n) * 0.618_033_988_749_895).fract() as f32 - 0.5;
+    for i in 0..120u32 {
+        let at = Vec3::new(
+            part(i) * 380.0,
+            part(i * 7 + 1) * 280.0,
+            part(i * 13 + 2) * 180.0 + 20.0,
+        );
+        let normal = Vec3::new(part(i * 3), part(i * 5), part(i * 11));
+        let (x, y) = normal.normalize().any_orthonormal_pair();
+        let size = 2.0 + (i % 7) as f32 * 3.0;
+        let strength = Vec3::splat(0.5 + (i % 5) as f32);
+        scene.light([at, at + x * size, at + y * size], strength);
+        if let Some(light) = scene.lights.last_mut() {
+            light.two_sided = i % 11 == 0;
+            light.model = if i % 6 == 0 { 1 + i % 2 } else { 0 };
+        }
+    }
+    for i in 0..8 {
+        scene.point(
+            Vec3::new(i as f32 * 40.0 - 150.0, 60.0, 40.0),
+            400.0 + 50.0 * i as f32,
+            4.0,
+        );
+    }
+    let first = scene.instances.len() as u32;
+    for model in [1, 2] {
+        scene.instances.push(Instance {
+            origin: Vec3::new(8.0, -5.0, 3.0) * model as f32,
+            ..identity()
+        });
+        scene.submodels.push(crate::scene::Submodel {
+            model,
+            instance: first + model - 1,
+        });
+    }
+    scene
+}
+
+fn a_tree_finds_each_light_from_within_its_nodes(gpu: &mut Gpu) {
+    let scene = cloud();
+    let (truth, _) = gpu.render(&scene, &all_lights(), 16);
+    let mean = |pixels: &[Vec3]| pixels.iter().map(|p| p.x).sum::<f32>() / pixels.len() as f32;
+    assert!(mean(&truth) > 0.01, "a test of nothing");
+    // one candidate: a descent alone
+    for (candidates, samples, frames) in [(1, 16, 24), (8, 16, 12), (8, 1, 192)] {
+        let settings = Settings {
+            rt_light_selection: LightSelection::Tree,
+            rt_num_random_dl: samples,
+            rt_candidates: candidates,
+            ..all_lights()
+        };
+        let (pixels, _) = gpu.render(&scene, &settings, frames);
+        let what = format!("{candidates} candidates, {samples} samples");
+        println!("{what}: {} of all lights", mean(&pixels) / mean(&truth));
+        differs_by_noise_alone(&pixels, &truth, &what);
+        let off = mean(&pixels) / mean(&truth) - 1.0;
+        assert!(off.abs() < 0.005, "{what}: {off}");
+    }
 }
 
 fn a_chosen_ray_goes_where_it_was_sent(gpu: &mut Gpu) {
@@ -387,6 +482,7 @@ fn errors_fall_faster_than_those_of_independent_frames(gpu: &mut Gpu) {
     for (selection, bound) in [
         (LightSelection::Uniform, 0.25),
         (LightSelection::Resampled, 0.3),
+        (LightSelection::Tree, 0.3),
     ] {
         let settings = Settings {
             rt_light_selection: selection,

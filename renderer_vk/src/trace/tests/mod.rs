@@ -24,6 +24,7 @@ mod mirrors;
 mod models;
 mod motion;
 mod parts;
+mod reservoirs;
 mod rough;
 mod screen_hits;
 mod sides;

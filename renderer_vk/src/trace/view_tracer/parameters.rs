@@ -9,7 +9,7 @@ use shaders::trace_types::{
 use shaders::types::{SunDisc, constants::NO_TEXTURE};
 
 use super::super::indirect::{self, is_subsampled};
-use super::{DARK_ADAPTATION, LIGHT_ADAPTATION, TracedMap, TracedView, ViewTracer, is_lit};
+use super::{DARK_ADAPTATION, LIGHT_ADAPTATION, TracedMap, TracedView, ViewTracer};
 use crate::gpu::{Error, Image, Recorder};
 use crate::raster::{FlareTest, WIDE_FORMAT};
 use crate::scene::{SUN_SIZE, TracedScene, perpendicular};
@@ -17,6 +17,7 @@ use crate::settings::{MOST_BOUNCES, Settings};
 use crate::trace::accel::AccelOutput;
 use crate::trace::beyond_sky::Beyond;
 use crate::trace::layer_boxes::in_sight;
+use crate::trace::light_selection::is_lit;
 use crate::trace::targets::Targets;
 
 /// Data that the parts of the traced look have prepared for a view.
@@ -66,6 +67,7 @@ impl ViewTracer {
             photons: (traced.map)
                 .map(|m| self.photons.view(&m.geometry.bodies, accumulated))
                 .unwrap_or_default(),
+            reservoirs: self.reservoirs.view(lights.lasting()),
             motion: prepared.motion,
             denoise: (self.denoiser).view(self.frame.wrapping_sub(1), targets),
             flares: FlareView {
