@@ -58,12 +58,13 @@ mod tests {
     use super::{command, lab};
 
     /// Options whose description differs between commands, such as a file in one and a folder in another.
-    const DESCRIBED_APART: [&str; 9] = [
+    const DESCRIBED_APART: [&str; 10] = [
         "cache",
         "calibrate",
         "frames",
         "json",
         "look",
+        "made",
         "output",
         "reference",
         "tracer",

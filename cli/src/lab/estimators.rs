@@ -41,7 +41,7 @@ pub struct EstimatorsArgs {
     #[command(flatten)]
     game: Game,
     /// Made-up halls with so many lights each
-    #[arg(long, value_name = "LIGHTS,…", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "SIZE,…", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=100_000))]
     made: Vec<u32>,
     /// Only estimators whose name begins with this, besides the reference; may be repeated
     #[arg(long, value_name = "NAME")]

@@ -48,7 +48,7 @@ pub struct TracersArgs {
     #[command(flatten)]
     game: Game,
     /// Made-up scenes of so many triangles each: a room with two boxes, and a ball if there are more than 37
-    #[arg(long, value_name = "TRIANGLES,…", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(14..=4_000_000))]
+    #[arg(long, value_name = "SIZE,…", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(14..=4_000_000))]
     made: Vec<u32>,
     /// Tracer, by the names of rt_tracer; grid=CELLS for a grid of so many cells; may be repeated; default: all, with
     /// grids of 16, 32, 64, 128, 256 and the automatic number of cells
