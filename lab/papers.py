@@ -118,10 +118,11 @@ def c3(bench):
     names = {("none", False): "no filter", ("none", True): "TAA", ("a-svgf", False): "A-SVGF", ("a-svgf", True): "both"}
     for row in next(iter(found.values())):
         name = names.get((row["filter"], row["taa"]))
+        case = "1 light" if row["samples"] == "1" else f"{row['samples']} lights"
         if name:
-            bench.add("C3", f"{row['samples']} lights", name, "SSIM", [row["ssim"]])
+            bench.add("C3", case, name, "SSIM", [row["ssim"]])
         if name == "no filter":
-            bench.add("C3", f"{row['samples']} lights", "no filter", "ms", [row["gpu_ms"]])
+            bench.add("C3", case, "no filter", "ms", [row["gpu_ms"]])
 
 
 def c4(bench):
@@ -165,7 +166,7 @@ def c9(bench):
             sets = [*HARD, f"rt_samples={samples}"]
             times = bench.medians("oa_dm1", f"{edge}x{edge}", "--game", lights.parent, "--tracer", "compute", sets=sets,
                                   frames=count)[0]
-            bench.add("C9", f"{edge} x {edge}", f"{samples} samples", "frames/s", [1000 / time for time in times])
+            bench.add("C9", f"{edge} x {edge}", f"{samples} a pixel", "frames/s", [1000 / time for time in times])
 
 
 def places(bench, game_map):

@@ -503,7 +503,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
                 bar.suspend(|| println!("{}", path.display()));
             }
         }
-        anyhow::Ok(())
+        others.end()
     })?;
     bar.finish_and_clear();
     if let Some(path) = &args.frame_times {

@@ -32,7 +32,7 @@ pub struct PartMean {
     pub frames: usize,
 }
 
-/// Devices beside the first one, each of which draws its parts in a thread.
+/// All devices but the first. Each has a thread, which draws its part of each picture.
 pub struct Others {
     means: Vec<Receiver<Result<PartMean>>>,
 }
@@ -62,6 +62,15 @@ impl Others {
         Self {
             means: devices.iter().enumerate().skip(1).map(start).collect(),
         }
+    }
+
+    /// Waits for the end of the threads.
+    ///
+    /// # Errors
+    /// A device failed after it had drawn its parts.
+    pub fn end(self) -> Result<()> {
+        let mut left = self.means.into_iter().flatten();
+        left.try_for_each(|part| part.map(drop))
     }
 
     /// Waits for the other parts of a picture, and lets the first device show the mean of all. `frames`: of the first

@@ -27,7 +27,7 @@ pub enum Item {
     Ui(UiMeshes),
     /// A 3D view in the classic look: at most one portal view, then the view itself.
     Classic(Vec<ClassicScene>),
-    /// The same with traced shadows, and what their rays meet.
+    /// The same with traced shadows, and the scene that their rays traverse.
     Hybrid(Vec<ClassicScene>, Box<TracedScene>),
     /// A 3D view in the traced look.
     Traced(Box<TracedScene>),
@@ -76,10 +76,10 @@ impl<'a> FrameContext<'a> {
             Item::Classic(scenes) => scenes
                 .iter()
                 .try_for_each(|scene| self.classic(recorder, scene, None)),
-            Item::Hybrid(scenes, met) => {
+            Item::Hybrid(scenes, traversed) => {
                 let traced = match (self.hybrid.as_deref_mut(), self.world) {
                     (Some(look), Some(world)) => {
-                        Some(look.begin(recorder, met, world, self.assets)?)
+                        Some(look.begin(recorder, traversed, world, self.assets)?)
                     }
                     _ => None,
                 };
@@ -217,7 +217,7 @@ impl<'a> FrameContext<'a> {
         }
     }
 
-    /// Records a view of the classic look. `traced`: what rays of the hybrid look meet.
+    /// Records a view of the classic look. `traced`: the scene that rays of the hybrid look traverse.
     fn classic(
         &mut self,
         recorder: &mut Recorder,
@@ -271,12 +271,12 @@ impl<'a> FrameContext<'a> {
         };
         let target = self.target();
         let mut uploaded = self.raster.upload(recorder, self.list, &parameters)?;
-        if let (Some(met), Some(look)) = (traced, self.hybrid.as_deref_mut()) {
+        if let (Some(traversed), Some(look)) = (traced, self.hybrid.as_deref_mut()) {
             let mirrors = self.list.calls.iter().any(reflects);
             let images = look.images([self.drawn.width(), self.drawn.height()], mirrors)?;
             (self.hybrid_surfaces).record(recorder, images, self.list, &parameters, &uploaded)?;
             let view = HybridInput {
-                met,
+                traversed,
                 scene,
                 parameters: &parameters,
                 mirrors,

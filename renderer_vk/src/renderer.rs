@@ -410,8 +410,8 @@ impl Renderer {
         let item = if traced {
             Item::Traced(Box::new(self.scene.gather_traced(&input, def)?))
         } else if hybrid {
-            let (views, met) = self.scene.gather_hybrid(&input, def)?;
-            Item::Hybrid(views, Box::new(met))
+            let (views, traversed) = self.scene.gather_hybrid(&input, def)?;
+            Item::Hybrid(views, Box::new(traversed))
         } else {
             Item::Classic(self.scene.gather_classic(&input, def)?)
         };

@@ -171,7 +171,7 @@ settings! { variables {
     rt_samples: u32 = "rt_samples", "1", ARCHIVE, kept(1.0, 8.0), Frame, Restarts, "Samples of light in each frame, direct and bounced: more leave less noise and trace more rays.";
     rt_light_selection: LightSelection = "rt_lightSelection", "1", ARCHIVE, kept(0.0, 3.0), Frame, Restarts, "How a random light is picked: 0 uniformly, 1 resampled by importance, 2 the same from a tree, 3 the same with samples of other pixels and frames (ReSTIR). Same picture in the mean.";
     rt_blue_noise: bool = "rt_blueNoise", "0", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "1 spreads the noise of light evenly over the picture, as blue noise. Same picture in the mean.";
-    rt_candidates: u32 = "rt_candidates", "8", ARCHIVE, kept(1.0, 64.0), Frame, Restarts, "Lights looked at for each pick with rt_lightSelection 1.";
+    rt_candidates: u32 = "rt_candidates", "8", ARCHIVE, kept(1.0, 64.0), Frame, Restarts, "Lights looked at for each pick; without effect with rt_lightSelection 0.";
     rt_pause: bool = "rt_pause", "0", NONE, kept(0.0, 1.0), Frame, GoesOn, "1 keeps what the traced look shows still: view, entities and time. The game goes on.";
     rt_accumulate: bool = "rt_accumulate", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 averages unfiltered frames while nothing moves, towards the exact picture; with rt_pause 1 also in a running game.";
     rt_antialiasing: bool = "rt_antialiasing", "1", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "1 moves the traced points within their pixels from frame to frame, for smooth edges.";

@@ -2,11 +2,13 @@
 //!
 //! Without a device each test is skipped; with `RELIGHT_REQUIRE_GPU=1` it fails.
 
+#[path = "common/cube.rs"]
+mod cube;
+
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 use q3bsp::builder::MapBuilder;
-use q3model::{Frame, Md3, PackedVertex, Surface};
 use relight::MemoryFiles;
 use renderer_vk::api::{EntityKind, Picture, RefDef, RefEntity, StretchedPicture};
 use renderer_vk::{Anaglyph, Error, Eye, Look, ModelShadows, Renderer, RendererOptions, Settings};
@@ -67,7 +69,7 @@ impl Stage {
         let mut files = MemoryFiles::new();
         files.insert("scripts/t.shader", SCRIPT).unwrap();
         files.insert("maps/t.bsp", map.build().write()).unwrap();
-        files.insert("m/box.md3", box_model()).unwrap();
+        files.insert("m/box.md3", cube::cube_model(16.0)).unwrap();
         renderer
             .begin_registration(Arc::new(files), &settings)
             .unwrap();
@@ -102,45 +104,8 @@ impl Stage {
 
 impl Drop for Stage {
     fn drop(&mut self) {
-        let messages = self.renderer.validation_messages();
-        if !std::thread::panicking() {
-            assert!(messages.is_empty(), "validation: {messages:#?}");
-        }
+        cube::check_validation(&self.renderer);
     }
-}
-
-/// A cube of 32 units.
-fn box_model() -> Vec<u8> {
-    let corners: Vec<Vec3> = (0..8u8)
-        .map(|i| {
-            let side = |bit: u8| if i >> bit & 1 == 0 { -16.0 } else { 16.0 };
-            Vec3::new(side(0), side(1), side(2))
-        })
-        .collect();
-    Md3 {
-        name: "box".into(),
-        frames: vec![Frame {
-            mins: Vec3::splat(-16.0),
-            maxs: Vec3::splat(16.0),
-            local_origin: Vec3::ZERO,
-            radius: 28.0,
-            name: String::new(),
-        }],
-        tags: Vec::new(),
-        num_tags: 0,
-        surfaces: vec![Surface {
-            name: "body".into(),
-            shaders: vec!["t/body".into()],
-            triangles: testkit::cube_triangles().collect(),
-            st: vec![Vec2::ZERO; 8],
-            vertices: corners
-                .iter()
-                .map(|p| PackedVertex::pack(*p, p.normalize()))
-                .collect(),
-            num_verts: 8,
-        }],
-    }
-    .write()
 }
 
 fn def() -> RefDef {

@@ -3,11 +3,13 @@
 //!
 //! Without a device each test is skipped; with `RELIGHT_REQUIRE_GPU=1` it fails.
 
+#[path = "common/cube.rs"]
+mod cube;
+
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 use q3bsp::builder::MapBuilder;
-use q3model::{Frame, Md3, PackedVertex, Surface};
 use relight::MemoryFiles;
 use renderer_vk::api::{DynamicLight, EntityKind, Picture, RefDef, RefEntity};
 use renderer_vk::{Look, Renderer, RendererOptions, Settings, TracerChoice};
@@ -90,7 +92,7 @@ impl Stage {
         files.insert("t/env.tga", white()).unwrap();
         files.insert("scripts/t.shader", SCRIPT).unwrap();
         files.insert("maps/t.bsp", map.build().write()).unwrap();
-        files.insert("m/box.md3", box_model()).unwrap();
+        files.insert("m/box.md3", cube::cube_model(HALF)).unwrap();
         renderer
             .begin_registration(Arc::new(files), &settings)
             .unwrap();
@@ -134,10 +136,7 @@ impl Stage {
 
 impl Drop for Stage {
     fn drop(&mut self) {
-        let messages = self.renderer.validation_messages();
-        if !std::thread::panicking() {
-            assert!(messages.is_empty(), "validation: {messages:#?}");
-        }
+        cube::check_validation(&self.renderer);
     }
 }
 
@@ -146,39 +145,6 @@ fn white() -> Vec<u8> {
     let mut tga = vec![0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 32, 8];
     tga.extend([255; 4]);
     tga
-}
-
-/// A cube around its origin.
-fn box_model() -> Vec<u8> {
-    let corner = |i: u8| {
-        let side = |bit: u8| if i >> bit & 1 == 0 { -HALF } else { HALF };
-        Vec3::new(side(0), side(1), side(2))
-    };
-    let corners: Vec<Vec3> = (0..8u8).map(corner).collect();
-    Md3 {
-        name: "box".into(),
-        frames: vec![Frame {
-            mins: Vec3::splat(-HALF),
-            maxs: Vec3::splat(HALF),
-            local_origin: Vec3::ZERO,
-            radius: 28.0,
-            name: String::new(),
-        }],
-        tags: Vec::new(),
-        num_tags: 0,
-        surfaces: vec![Surface {
-            name: "body".into(),
-            shaders: vec!["t/body".into()],
-            triangles: testkit::cube_triangles().collect(),
-            st: vec![Vec2::ZERO; 8],
-            vertices: corners
-                .iter()
-                .map(|p| PackedVertex::pack(*p, p.normalize()))
-                .collect(),
-            num_verts: 8,
-        }],
-    }
-    .write()
 }
 
 /// Looks down at 45 degrees.

@@ -53,7 +53,7 @@ float hybrid_shadow(HybridPlaces p, bool dynamic, uint light) {
     for (int i = 0; i < 4; i++) {
         HybridTexel texel = texels.at[hybrid_index(p, hybrid_place(p, i))];
         float weight = hybrid_weight(p, i, texel.inverse_depth);
-        sum += weight * (dynamic ? float(texel.hidden >> light & 1u) : texel.occlusion);
+        sum += weight * (dynamic ? float(texel.occluded_lights >> light & 1u) : texel.occlusion);
         weights += weight;
     }
     return weights > 0.0 ? sum / weights : 0.0;

@@ -350,7 +350,7 @@ pub struct RasterLight {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct HybridTexel {
     /// Bit i: something is between the surface and dynamic light i.
-    pub hidden: u32,
+    pub occluded_lights: u32,
     /// Part of the hemisphere, weighted by the cosine, that models occlude.
     pub occlusion: f32,
     /// 1 over the depth `w` of clip space; 0: no surface of the map.

@@ -43,7 +43,7 @@ bool gathers(LightTask task, out GlossPixel gloss) {
 }
 
 // Whether no path starts at the pixel of a cell. Nothing reads what these passes would write for it.
-bool starts_nothing(ivec2 cell, ivec2 pixel) { return is_specular() ? !is_glossy(gloss_read(pixel).gloss) : !asks(cell); }
+bool starts_nothing(ivec2 cell, ivec2 pixel) { return is_specular() ? !is_glossy(gloss_read(pixel).gloss) : !is_selected(cell); }
 
 // Bound of the light of a specular path in live frames: relative to the specular albedo.
 float most_specular_light(GlossPixel gloss) { return MOST_LIVE_LIGHT / max(max_component(gloss.lobe_albedo), 1.0e-3); }

@@ -22,7 +22,7 @@ void main() {
         ivec2 cell = corner + ivec2(i % WIDE, i / WIDE);
         places[i] = vec4(-1.0);
         if (any(lessThan(cell, ivec2(0))) || any(greaterThanEqual(cell, cells))) continue;
-        if (!asks(cell)) {
+        if (!is_selected(cell)) {
             gathered[i] = NOT_GATHERED;
             continue;
         }

@@ -9,11 +9,11 @@
 // Edge of a cell, pixels.
 const int CELL = 2;
 
-// 1: only the cells gather that `bounce_ask.comp` has marked. 0 removes the code.
+// 1: only the cells gather that `bounce_select.comp` has marked. 0 removes the code.
 layout(constant_id = 8) const uint ADAPTIVE = 0;
 
 // Whether the cell gathers bounced light.
-bool asks(ivec2 cell) { return ADAPTIVE == 0 || imageLoad(uimages_r32ui[DENOISE.asked], cell).x != 0; }
+bool is_selected(ivec2 cell) { return ADAPTIVE == 0 || imageLoad(uimages_r32ui[DENOISE.selected], cell).x != 0; }
 
 // In the image of bounced light: no pixel around has gathered. No light is packed to this code.
 const uint NOT_GATHERED = 0xFFFFFFFFu;
@@ -57,7 +57,7 @@ ivec2 subsample_pixel(ivec2 cell) {
 
 // Whether the pixel itself has gathered bounced light.
 bool is_gathered(ivec2 pixel) {
-    return (VIEW.flags & VIEW_SUBSAMPLED_BOUNCE) == 0 || asks(pixel / CELL) && subsample_pixel(pixel / CELL) == pixel;
+    return (VIEW.flags & VIEW_SUBSAMPLED_BOUNCE) == 0 || is_selected(pixel / CELL) && subsample_pixel(pixel / CELL) == pixel;
 }
 
 #endif

@@ -21,16 +21,16 @@ use crate::view::{Camera, draw, load, open};
 ///
 /// Renders a view with every light of the list (the reference), with one light chosen uniformly, with one chosen by
 /// importance from the lists, from a tree over all lights, from the lists with the samples of neighbouring pixels, from
-/// one list of all lights, and with every light of the map. Prints for each the relative difference of the whole picture, and of
-/// the worst tile of 16 x 16 pixels, from the reference, in percent and in standard errors (noise stays below 4 or 5,
-/// bias grows with the frames), and the noise of the first frame, of 16 and of all: the mean squared error over the
-/// squared mean of the picture, times the frames. Frames that are independent have the same noise; that of all frames
-/// includes the noise of the reference. Milliseconds are those of the passes that sample lights for visible surfaces and
-/// trace the rays, on the GPU; bytes and build times those of the lists or of the tree. JSON also has the mean over the pixels of the squared error over the squared
-/// pixel, where pixels below a hundredth of the picture's mean count as that. A tile darker than a hundredth of the
-/// picture is measured against that. --tiles adds the noisiest tiles of each estimator: position, relative brightness,
-/// difference and standard error of its mean. These predict the noise after more frames: the standard error falls at
-/// least with the square root of the frames.
+/// one list of all lights, and with every light of the map. Prints for each the relative difference of the whole
+/// picture, and of the worst tile of 16 x 16 pixels, from the reference, in percent and in standard errors (noise stays
+/// below 4 or 5, bias grows with the frames), and the noise of the first frame, of 16 and of all: the mean squared
+/// error over the squared mean of the picture, times the frames. Frames that are independent have the same noise; that
+/// of all frames includes the noise of the reference. Milliseconds are those of the passes that sample lights for
+/// visible surfaces and trace the rays, on the GPU; bytes and build times those of the lists or of the tree. JSON also
+/// has the mean over the pixels of the squared error over the squared pixel, where pixels below a hundredth of the
+/// picture's mean count as that. A tile darker than a hundredth of the picture is measured against that. --tiles adds
+/// the noisiest tiles of each estimator: position, relative brightness, difference and standard error of its mean.
+/// These predict the noise after more frames: the standard error falls at least with the square root of the frames.
 ///
 /// Example: relight-lab estimators oa_dm1 --frames 4096 --size 512x384
 #[derive(Args, Debug)]

@@ -112,7 +112,7 @@ impl Shading {
         self.textures >> place & 1 != 0 && self.tc_gen.at(place) == c::TCGEN_ENVIRONMENT
     }
 
-    /// Whether rays find a part of what the draw shows.
+    /// Whether the draw shows shadows or reflections that rays found.
     pub fn is_hybrid(&self) -> bool {
         self.shadowed != 0 || self.mirrored != 0
     }

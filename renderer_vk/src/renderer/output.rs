@@ -140,9 +140,9 @@ impl Renderer {
                 // held views are copies: keeping their memory would leak a copy per frame
                 Item::Traced(_) if self.settings.rt_pause => {}
                 Item::Traced(scene) => self.scene.recycle_traced(*scene),
-                Item::Hybrid(scenes, met) => {
+                Item::Hybrid(scenes, traversed) => {
                     self.scene.recycle_classic(scenes);
-                    self.scene.recycle_traced(*met);
+                    self.scene.recycle_traced(*traversed);
                 }
             }
         }

@@ -445,8 +445,8 @@ impl Scene {
         self.gather(input, |scene| gather::traced_view(scene, input, def))
     }
 
-    /// Turns the added content into views of the classic look whose shadows are traced, and into the view that their rays
-    /// meet.
+    /// Turns the added content into views of the classic look whose shadows are traced, and into the view that their
+    /// rays traverse.
     ///
     /// # Errors
     /// As [`gather_classic`](Self::gather_classic).

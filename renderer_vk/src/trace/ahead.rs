@@ -50,7 +50,7 @@ const AHEAD: [Pass; 41] = [
     Pass::ScreenSurface,
     Pass::ScreenMarch,
     Pass::ScreenLight,
-    Pass::BounceAsk,
+    Pass::BounceSelect,
 ];
 /// Passes that only maps with fog run.
 const FOG_AHEAD: [Pass; 2] = [Pass::FogLight, Pass::FogFilter];
@@ -72,7 +72,7 @@ fn is_chosen(pass: Pass, settings: &Settings, needs: MapNeeds) -> bool {
             settings.rt_bounces > 0 || gloss
         }
         Pass::ScreenSurface | Pass::ScreenMarch | Pass::ScreenLight => screen::in_use(settings),
-        Pass::BounceAsk => indirect::is_adaptive(settings),
+        Pass::BounceSelect => indirect::is_adaptive(settings),
         Pass::SpecularLight => gloss,
         Pass::Photons | Pass::PhotonCells => needs.bodies && photons::in_use(settings),
         Pass::BounceUpsample => indirect::is_subsampled(settings, false),

@@ -112,7 +112,7 @@ pub struct Denoiser {
     device: Device,
     images: Option<Images>,
     /// For each cell of 2 × 2 pixels, whether it gathers bounced light; only where not all do.
-    asked: Option<Image>,
+    selected: Option<Image>,
     /// Placeholder for absent images: software drivers access the images of branches that are not taken.
     nothing: Image,
     /// The images hold valid light of the last frame.
@@ -132,7 +132,7 @@ impl Denoiser {
         Ok(Self {
             device: device.clone(),
             images: None,
-            asked: None,
+            selected: None,
             nothing: make(device, "trace no light", [1, 1], Format::Rgba32Uint)?,
             history: false,
             gradients: true,
@@ -178,10 +178,10 @@ impl Denoiser {
     pub fn prepare_cells(&mut self, adaptive: bool, size: [u32; 2]) -> Result<(), Error> {
         let cells = size.map(|n| n.div_ceil(2));
         let fits = |image: &Image| adaptive && [image.width(), image.height()] == cells;
-        self.asked = self.asked.take().filter(fits);
-        if adaptive && self.asked.is_none() {
-            let made = make(&self.device, "trace asked cells", cells, Format::R32Uint)?;
-            self.asked = Some(made);
+        self.selected = self.selected.take().filter(fits);
+        if adaptive && self.selected.is_none() {
+            let made = make(&self.device, "trace selected cells", cells, Format::R32Uint)?;
+            self.selected = Some(made);
         }
         Ok(())
     }
@@ -218,7 +218,7 @@ impl Denoiser {
             stratum_guide: nothing,
             gradient: nothing,
             past: nothing,
-            asked: (self.asked.as_ref()).map_or(nothing, Image::storage_index),
+            selected: (self.selected.as_ref()).map_or(nothing, Image::storage_index),
             depth_gradient: targets.depth_gradient[0].storage_index(),
             ..DenoiseView::default()
         };

@@ -85,8 +85,8 @@ pub struct HybridScene {
 
 /// A hybrid view whose surfaces are drawn.
 pub struct HybridInput<'a> {
-    /// What its rays meet.
-    pub met: HybridScene,
+    /// The scene that its rays traverse.
+    pub traversed: HybridScene,
     /// The view.
     pub scene: &'a ClassicScene,
     /// Parameters of its draws.
@@ -127,7 +127,7 @@ impl HybridLook {
         self.passes.tracer()
     }
 
-    /// Builds the structures of what rays meet.
+    /// Builds the acceleration structures of the frame.
     ///
     /// # Errors
     /// Out of memory, or a lost device.
@@ -183,7 +183,7 @@ impl HybridLook {
         assets: &Assets,
     ) -> Result<u64, Error> {
         let HybridInput {
-            met: scene,
+            traversed: scene,
             scene: view,
             parameters: p,
             mirrors,

@@ -57,7 +57,7 @@ pub fn record(
 ) -> Result<(), Error> {
     let parts = if passes.facts.subsampled { 1 } else { 4 };
     if passes.facts.adaptive {
-        passes.run(Pass::BounceAsk)?;
+        passes.run(Pass::BounceSelect)?;
     }
     // the number of the path is in the bits above those of the pixel
     let runs =

@@ -114,7 +114,7 @@ impl Emission {
     }
 }
 
-/// The smallest cone that contains the cones of two emissions, of which the first is as wide or wider.
+/// Axis and half angle of the smallest cone that contains those of both; the first is not the narrower one.
 fn cone_of_both(wide: Emission, narrow: Emission) -> (Vec3, f32) {
     let between = wide.axis.dot(narrow.axis).clamp(-1.0, 1.0).acos();
     if (between + narrow.spread).min(PI) <= wide.spread {

@@ -411,7 +411,7 @@ impl TraceLook {
         self.tracer.rays()?.get(counter_of(pass)?).copied()
     }
 
-    /// Cost of the structures of the map's constant geometry.
+    /// Cost of the structures from which the map's lights are sampled.
     pub fn light_cost(&self) -> LightCost {
         self.lights.cost()
     }

@@ -246,27 +246,27 @@ passes! {
     MirrorLight = "trace_mirror_light", Rays(&shaders::TRACE_MIRROR_LIGHT), Cells {
         switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::subsample::ADAPTIVE, Adaptive), (ids::lights::LIGHT_TREE, LightTree)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals],
-        may_read: &[GradientPixels, BounceLights, AskedCells],
+        may_read: &[GradientPixels, BounceLights, SelectedCells],
         writes: &[BounceLights],
         counter: Some(t::COUNT_MIRRORS),
     }
     /// Selects the cells that gather bounced light (`rt_bounceAdaptive`).
-    BounceAsk = "trace_bounce_ask", Compute(&shaders::TRACE_BOUNCE_ASK_COMP), Cells {
+    BounceSelect = "trace_bounce_select", Compute(&shaders::TRACE_BOUNCE_SELECT_COMP), Cells {
         reads: &[GBuffer, Positions, Normals],
-        writes: &[AskedCells],
+        writes: &[SelectedCells],
     }
     /// Hits of the first ray of a path in the last frame's picture (`rt_bounceScreen`).
     ScreenMarch = "trace_screen_march", Compute(&shaders::TRACE_SCREEN_MARCH_COMP), Cells {
         switches: &[(ids::subsample::ADAPTIVE, Adaptive)],
         reads: &[GBuffer, Positions, Normals],
-        may_read: &[GradientPixels, AskedCells],
+        may_read: &[GradientPixels, SelectedCells],
         writes: &[ScreenHits],
     }
     /// Rays of a bounce.
     BounceRays = "trace_bounce_rays", Rays(&shaders::TRACE_BOUNCE_RAYS), Cells {
         switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive), (ids::bounce_rays::ROULETTE, Roulette)],
         reads: &[Scene, GBuffer, Positions, Normals],
-        may_read: &[GradientPixels, BounceLights, GlossSurfaces, ScreenHits, AskedCells, DirectLight],
+        may_read: &[GradientPixels, BounceLights, GlossSurfaces, ScreenHits, SelectedCells, DirectLight],
         writes: &[BounceHits],
         counter: Some(t::COUNT_BOUNCE_RAYS),
     }
@@ -274,7 +274,7 @@ passes! {
     BounceShade = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
         switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive), (ids::lights::LIGHT_TREE, LightTree)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
-        may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells, AskedCells],
+        may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells, SelectedCells],
         writes: &[BounceLights, GlossSurfaces],
     }
     /// The same of the last bounce, after which no path goes on.
@@ -282,14 +282,14 @@ passes! {
         constants: &[(ids::bounce::LAST_BOUNCE, 1)],
         switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive), (ids::lights::LIGHT_TREE, LightTree)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
-        may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells, AskedCells],
+        may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells, SelectedCells],
         writes: &[BounceLights, GlossSurfaces],
     }
     /// Shadow rays to those lights; the last writes the light of the paths, of one of both kinds.
     BounceLight = "trace_bounce_light", Rays(&shaders::TRACE_BOUNCE_LIGHT), Cells {
         switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::subsample::ADAPTIVE, Adaptive)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceLights],
-        may_read: &[GradientPixels, GlossSurfaces, AskedCells],
+        may_read: &[GradientPixels, GlossSurfaces, SelectedCells],
         writes: &[IndirectLight, GlossLight],
         counter: Some(t::COUNT_BOUNCE_LIGHT),
     }
@@ -305,14 +305,14 @@ passes! {
     BounceUpsample = "trace_bounce_upsample", Compute(&shaders::TRACE_BOUNCE_UPSAMPLE_COMP), Cells {
         switches: &[(ids::subsample::ADAPTIVE, Adaptive)],
         reads: &[GBuffer, Positions, Normals, IndirectLight],
-        may_read: &[GradientPixels, AskedCells],
+        may_read: &[GradientPixels, SelectedCells],
         writes: &[IndirectLight],
     }
     /// Change of the light of each gradient pixel.
     GradientSample = "trace_gradient_sample", Compute(&shaders::TRACE_GRADIENT_SAMPLE_COMP), Strata {
         switches: &[(ids::subsample::ADAPTIVE, Adaptive)],
         reads: &[GradientPixels, DirectLight, IndirectLight],
-        may_read: &[AskedCells],
+        may_read: &[SelectedCells],
         writes: &[GradientSamples],
     }
     /// Filters it over strata up to 6 away.
@@ -329,7 +329,7 @@ passes! {
     Temporal = "trace_temporal", Compute(&shaders::TRACE_TEMPORAL_COMP), Traced {
         switches: &[(ids::temporal::BOUNCES, Bounces), (ids::subsample::ADAPTIVE, Adaptive)],
         reads: &[GBuffer, Positions, Normals, DirectLight, IndirectLight],
-        may_read: &[GradientPixels, Gradients, AskedCells],
+        may_read: &[GradientPixels, Gradients, SelectedCells],
         writes: &[FreshLight, DepthGradient, Past],
     }
     /// A-SVGF: first wavelet step; its result is the history of the next frame.

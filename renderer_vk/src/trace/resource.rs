@@ -38,7 +38,7 @@ pub enum Resource {
     /// Direct light without albedo; the denoiser leaves the sum of all filtered light here.
     DirectLight,
     /// Cells of 2 × 2 pixels that gather bounced light.
-    AskedCells,
+    SelectedCells,
     /// What the rays of a bounce hit.
     BounceHits,
     /// Hits of bounce rays in the last frame's picture.

@@ -72,7 +72,7 @@ pub struct DenoiseView {
     /// temporal pass writes them it holds bounced light.
     pub past: u32,
     /// R32UI, one texel for each cell of 2 × 2 pixels: 1 if it gathers bounced light in this frame.
-    pub asked: u32,
+    pub selected: u32,
 }
 
 /// What bounces of the next frame take from this one; bindless indices of images.

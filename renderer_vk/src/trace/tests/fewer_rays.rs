@@ -4,9 +4,9 @@ use glam::Vec3;
 use shaders::trace_types::constants as t;
 
 use super::bounces::{furnace, seen};
-use super::harness::{Gpu, Scene, bounced, encode, gpu_tests, through_byte};
+use super::harness::{Gpu, Scene, bounced, encode, gpu_tests, switch_dlight, through_byte};
 use super::screen_hits::{lit_hall, on_screen};
-use crate::api::{DynamicLight, RefDef};
+use crate::api::RefDef;
 use crate::scene::TracedScene;
 use crate::settings::{DenoiserChoice, Settings};
 
@@ -81,16 +81,12 @@ fn bounced_light_that_changes_is_traced_at_once(gpu: &mut Gpu) {
     let mut scene = Scene::hall(40.0, 0.6, 96);
     scene.point(Vec3::new(-100.0, -100.0, 0.0), 600.0, 4.0);
     let lamp = |frame: u32, view: &mut TracedScene| {
-        view.dlights.clear();
-        if (40..80).contains(&frame) {
-            view.dlights.push(DynamicLight {
-                origin: Vec3::new(0.0, -60.0, 60.0),
-                radius: 400.0,
-                color: Vec3::ONE,
-                additive: false,
-                end: None,
-            });
-        }
+        switch_dlight(
+            view,
+            Vec3::new(0.0, -60.0, 60.0),
+            400.0,
+            (40..80).contains(&frame),
+        );
     };
     let [all, some] = [0, 16].map(|samples| watched(gpu, &scene, &adaptive(samples), 110, lamp).0);
     println!("on  {:?}\n    {:?}", &all[38..50], &some[38..50]);

@@ -39,8 +39,8 @@ fn live() -> Settings {
     }
 }
 
-/// Mean of the pictures of `runs` runs of four frames, the camera of which `place` moves. Reuse makes a frame depend on
-/// those before: the mean of one long run would converge slowly.
+/// Mean over `runs` independent runs of four frames; `place` offsets the camera in each frame. Reuse correlates successive
+/// frames, so that the mean of one long run would converge slowly.
 fn mean_of_runs(
     gpu: &mut Gpu,
     scene: &Scene,

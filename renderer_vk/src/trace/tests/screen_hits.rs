@@ -4,8 +4,7 @@ use glam::Vec3;
 use shaders::trace_types::constants as t;
 
 use super::bounces::{furnace, seen};
-use super::harness::{Gpu, Scene, bounced, encode, gpu_tests, through_byte};
-use crate::api::DynamicLight;
+use super::harness::{Gpu, Scene, bounced, encode, gpu_tests, switch_dlight, through_byte};
 use crate::scene::TracedScene;
 use crate::settings::{DenoiserChoice, Settings};
 
@@ -149,16 +148,7 @@ fn reference_frames_take_no_light_of_the_picture(gpu: &mut Gpu) {
 fn light_in_the_picture_goes_out_with_its_lamp(gpu: &mut Gpu) {
     let scene = Scene::hall(40.0, 0.6, 64);
     let lamp = |frame: u32, view: &mut TracedScene| {
-        view.dlights.clear();
-        if frame < 24 {
-            view.dlights.push(DynamicLight {
-                origin: Vec3::new(0.0, -60.0, 60.0),
-                radius: 400.0,
-                color: Vec3::ONE,
-                additive: false,
-                end: None,
-            });
-        }
+        switch_dlight(view, Vec3::new(0.0, -60.0, 60.0), 400.0, frame < 24);
     };
     let mut frames_to_dark = [0u32; 2];
     for (frames, steps) in frames_to_dark.iter_mut().zip([0, 64]) {

@@ -7,8 +7,9 @@ pub mod stage;
 use glam::{Vec3, Vec4};
 use shaders::types::Instance;
 
+use crate::api::DynamicLight;
 use crate::half::half;
-use crate::scene::Portal;
+use crate::scene::{Portal, TracedScene};
 use crate::settings::{Look, Settings};
 
 pub use gpu::Gpu;
@@ -50,6 +51,19 @@ pub fn rectangle(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> [Vec3; 4] {
         corner + edge_u + edge_v,
         corner + edge_v,
     ]
+}
+
+/// A white dynamic light in a view, or none.
+pub fn switch_dlight(view: &mut TracedScene, origin: Vec3, radius: f32, on: bool) {
+    view.dlights.clear();
+    if on {
+        view.dlights.push(DynamicLight {
+            origin,
+            radius,
+            color: Vec3::ONE,
+            ..DynamicLight::default()
+        });
+    }
 }
 
 /// A horizontal square around the z axis that faces up: its height, and half its side.

@@ -46,7 +46,7 @@ float samples_at(ivec2 pixel, float view_distance) {
     return weight < 0.01 ? 0.0 : sum / weight * distortion(pixel);
 }
 
-bool asks_for(ivec2 pixel) {
+bool needs_samples(ivec2 pixel) {
     if (!inside(pixel)) return false;
     float view_distance = lit_distance_read(pixel, distance_tail_read(pixel));
     if (view_distance < 0.0) return false;
@@ -60,7 +60,7 @@ bool asks_for(ivec2 pixel) {
 void main() {
     ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(cell, (ivec2(VIEW.width, VIEW.height) + CELL - 1) / CELL))) return;
-    bool asked = (DENOISE.flags & DENOISE_HISTORY) == 0 || probes(cell);
-    for (int i = 0; i < CELL * CELL && !asked; i++) asked = asks_for(cell * CELL + ivec2(i & 1, i >> 1));
-    imageStore(uimages_r32ui[DENOISE.asked], cell, uvec4(asked ? 1 : 0));
+    bool selected = (DENOISE.flags & DENOISE_HISTORY) == 0 || probes(cell);
+    for (int i = 0; i < CELL * CELL && !selected; i++) selected = needs_samples(cell * CELL + ivec2(i & 1, i >> 1));
+    imageStore(uimages_r32ui[DENOISE.selected], cell, uvec4(selected ? 1 : 0));
 }
