@@ -6,7 +6,7 @@
 // weight * g(y) is the sum over all lights of the integral of g over those numbers for which s receives light from y,
 // shadows included. Joined reservoirs are weighted by multiple importance sampling, where surfaces that could not have
 // produced the sample have no part: that makes the estimate unbiased (section 4.3), and costs a ray for each. The paper
-// counts the surfaces that could have, with larger errors (docs/src/how/techniques.md); here reservoirs share a sample in
+// counts the surfaces that could have, with larger errors (docs/src/how/light-selection.md); here reservoirs share a sample in
 // proportion to count and target: the balance heuristic of two frames, and pairwise of a pixel and each of its neighbours
 // (Lin et al., Generalized Resampled Importance Sampling, TOG 41(4), 2022, section 7.1). A sample is selected by weights
 // without shadows; the selected one has the exact weight. Selections use numbers that are independent between frames: those
