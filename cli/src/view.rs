@@ -255,12 +255,15 @@ pub fn draw(
     entities: &[RefEntity],
     def: &RefDef,
 ) -> anyhow::Result<FrameStats> {
-    renderer.begin_frame(def.time_ms);
-    renderer.clear_scene();
-    for entity in entities {
-        renderer.add_entity(entity);
+    for &eye in renderer.eyes() {
+        renderer.begin_frame(def.time_ms);
+        renderer.set_eye(eye);
+        renderer.clear_scene();
+        for entity in entities {
+            renderer.add_entity(entity);
+        }
+        renderer.render_scene(def)?;
     }
-    renderer.render_scene(def)?;
     Ok(renderer.end_frame()?)
 }
 

@@ -157,7 +157,7 @@ impl Default for RefDef {
 }
 
 /// A dynamic light as the game sends it.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DynamicLight {
     /// Position.
     pub origin: Vec3,

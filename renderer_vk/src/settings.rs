@@ -189,7 +189,9 @@ settings! { variables {
     rt_bounces: u32 = "rt_bounces", "1", ARCHIVE, kept(0.0, MOST_BOUNCES as f32), Frame, Restarts, "Bounces of light from surface to surface, matt or mirror. Few maps need more than 1.";
     rt_bounce_screen: u32 = "rt_bounceScreen", "0", ARCHIVE, kept(0.0, 256.0), Frame, GoesOn, "Steps of a bounce ray through the last frame's picture, whose light it takes where it hits; 0 only traces.";
     rt_bounce_thickness: f32 = "rt_bounceThickness", "2", ARCHIVE, kept(0.125, 64.0), Frame, GoesOn, "Thickness of surfaces for rt_bounceScreen, widths of a pixel.";
-    rt_bounce_adaptive: u32 = "rt_bounceAdaptive", "0", ARCHIVE, kept(0.0, 28.0), Frame, GoesOn, "Frames after which a pixel at rest traces bounces seldom, with rt_denoiser 1; 0 always traces.";
+    rt_bounce_adaptive: u32 = "rt_bounceAdaptive", "16", ARCHIVE, kept(0.0, 28.0), Frame, GoesOn, "Frames after which a pixel at rest traces bounces seldom, with rt_denoiser 1; 0 always traces.";
+    rt_foveation: f32 = "rt_foveation", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "Part of the samples of rt_bounceAdaptive that the corners of the picture save.";
+    rt_share_eyes: bool = "rt_shareEyes", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 lets the second eye of r_anaglyphMode take bounced light from the first.";
     rt_bounce_roulette: bool = "rt_bounceRoulette", "0", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "1 ends paths of bounces where they have found light. Same picture in the mean.";
     rt_exposure: f32 = "rt_exposure", "0", ARCHIVE, kept(-16.0, 16.0), Frame, GoesOn, "Exposure in stops, added to the automatic one.";
     rt_auto_exposure: bool = "rt_autoExposure", "1", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 adapts the exposure to the picture.";

@@ -21,9 +21,8 @@ bool probes(ivec2 cell) {
     return (VIEW.seed + turn) % PROBE_FRAMES < PROBE_SUCCESSIVE;
 }
 
-// Number of samples in the history of the bounced light, where the pixel's surface was in the last frame.
-float samples_at(ivec2 pixel, float view_distance) {
-    LastPixel last = last_pixel_of(pixel);
+// Number of samples that a history has of the bounced light of the pixel's surface.
+float samples_in(LightTexels texels, LastPixel last, ivec2 pixel, float view_distance) {
     if (!(last.depth > 0.0)) return 0.0;
     uvec2 surface = imageLoad(uimages_rg32ui[VIEW.images.surface], pixel).xy;
     vec3 way = place_ahead(pixel, 1.0) - VIEW.camera.origin;
@@ -37,13 +36,21 @@ float samples_at(ivec2 pixel, float view_distance) {
         ivec2 offset = ivec2(i & 1, i >> 1), tap = ivec2(low) + offset;
         float share = (offset.x == 1 ? part.x : 1.0 - part.x) * (offset.y == 1 ? part.y : 1.0 - part.y);
         if (!inside(tap) || share < 1.0e-3) continue;
-        uvec4 texel = LightTexels(DENOISE.history).at[place_of(tap)];
+        uvec4 texel = texels.at[place_of(tap)];
         if (texel.w == 0 || abs(guide_depth(texel.w) - last.depth) > tolerance) continue;
         if (((texel.w ^ guide) & REFLECTION_BIT) != 0 || dot(guide_normal(texel.w & ~REFLECTION_BIT), unpack_normal(surface.y)) < 0.85) continue;
         sum += past_frames(texel.z).y * share;
         weight += share;
     }
-    return weight < 0.01 ? 0.0 : sum / weight * distortion(pixel);
+    return weight < 0.01 ? 0.0 : sum / weight;
+}
+
+// The number in the last frame, and of the other eye.
+float samples_at(ivec2 pixel, float view_distance) {
+    float own = samples_in(LightTexels(DENOISE.history), last_pixel_of(pixel), pixel, view_distance) * distortion(pixel);
+    if (SHARED_EYES == 0) return own;
+    float depth = depth_of(pixel, view_distance);
+    return max(own, samples_in(LightTexels(DENOISE.other_eye), LastPixel(other_eye_pixel(pixel, depth), depth), pixel, view_distance));
 }
 
 bool needs_samples(ivec2 pixel) {
@@ -54,13 +61,16 @@ bool needs_samples(ivec2 pixel) {
         vec2 change = imageLoad(images_rg16f[DENOISE.gradient], pixel / STRATUM).xy;
         if (max(change.x, change.y) > CHANGED) return true;
     }
-    return samples_at(pixel, view_distance) < VIEW.transport.bounce_samples;
+    // at least the first sample
+    vec2 aside = (vec2(pixel) + 0.5) / vec2(VIEW.width, VIEW.height) * 2.0 - 1.0;
+    float wanted = VIEW.transport.bounce_samples * (1.0 - VIEW.transport.foveation * 0.5 * dot(aside, aside));
+    return samples_at(pixel, view_distance) < max(wanted, 1.0e-3);
 }
 
 void main() {
     ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(cell, (ivec2(VIEW.width, VIEW.height) + CELL - 1) / CELL))) return;
-    bool selected = (DENOISE.flags & DENOISE_HISTORY) == 0 || probes(cell);
+    bool selected = SHARED_EYES == 0 && (DENOISE.flags & DENOISE_HISTORY) == 0 || probes(cell);
     for (int i = 0; i < CELL * CELL && !selected; i++) selected = needs_samples(cell * CELL + ivec2(i & 1, i >> 1));
     imageStore(uimages_r32ui[DENOISE.selected], cell, uvec4(selected ? 1 : 0));
 }

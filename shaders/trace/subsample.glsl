@@ -12,6 +12,16 @@ const int CELL = 2;
 // 1: only the cells gather that `bounce_select.comp` has marked. 0 removes the code.
 layout(constant_id = 8) const uint ADAPTIVE = 0;
 
+// 1: the other eye's light of this frame is known (`rt_shareEyes`). 0 removes the code.
+layout(constant_id = 19) const uint SHARED_EYES = 0;
+
+// Where the other eye shows the point that this one shows at `pixel`: the cameras differ by an offset to the side and an
+// opposite slope of the picture, so that depths are equal. Also for a flat mirror's image, which stands still.
+vec2 other_eye_pixel(ivec2 pixel, float depth) {
+    float shift = VIEW.camera.stereo_shift * (1.0 - DENOISE.convergence / max(depth, NEAREST_DEPTH));
+    return vec2(pixel) + vec2(float(VIEW.width) * shift, 0.0);
+}
+
 // Whether the cell gathers bounced light.
 bool is_selected(ivec2 cell) { return ADAPTIVE == 0 || imageLoad(uimages_r32ui[DENOISE.selected], cell).x != 0; }
 

@@ -12,6 +12,8 @@ layout(constant_id = 0) const uint BOUNCES = 1;
 // Least weight of a new frame, of direct and indirect light.
 const vec2 MIN_WEIGHT = vec2(0.05, 0.035);
 const float MIN_VARIANCE_WEIGHT = 0.1;
+// Weight of the other eye's bounced light.
+const float OTHER_EYE = 0.25;
 // Filtered noise of one frame, as a relative change of the light.
 const float NOISE = 0.15;
 // Frames after which the variance over time is reliable; before, it is estimated over space.
@@ -33,9 +35,9 @@ struct History {
 
 // Adds a tap of the history. Colours are summed as codes, weighted by the level. `normal`: components of the guide;
 // `range`: least and greatest inverse depth of the same surface.
-void add_tap(inout History h, ivec2 tap, vec3 normal, vec2 range, float weight) {
+void add_tap(inout History h, LightTexels texels, ivec2 tap, vec3 normal, vec2 range, float weight) {
     if (!inside(tap) || !(weight > 0.0)) return;
-    uvec4 texel = LightTexels(DENOISE.history).at[place_of(tap)];
+    uvec4 texel = texels.at[place_of(tap)];
     float inverse = guide_inverse(texel.w);
     vec3 bend = guide_components(texel.w) - normal;
     // the inverse depth of a pixel without a surface is 0
@@ -49,11 +51,11 @@ void add_tap(inout History h, ivec2 tap, vec3 normal, vec2 range, float weight) 
     h.weight += weight;
 }
 
-History history_at(ivec2 pixel, uint guide, vec2 depth_gradient) {
-    const History NONE = History(LightTexel(vec2(0.0), vec2(0.0), vec2(0.0), vec2(0.0), 0), vec2(0.0), 0.0);
-    History h = NONE;
-    if ((DENOISE.flags & DENOISE_HISTORY) == 0) return h;
-    LastPixel last = last_pixel_of(pixel);
+const History NO_HISTORY = History(LightTexel(vec2(0.0), vec2(0.0), vec2(0.0), vec2(0.0), 0), vec2(0.0), 0.0);
+
+// History of the surface at a position of an earlier picture, or of the other eye's.
+History history_in(LightTexels texels, LastPixel last, uint guide, vec2 depth_gradient) {
+    History h = NO_HISTORY;
     if (!(last.depth > 0.0)) return h;
     // tolerance for the depth gradient of the taps and for rounding
     float tolerance = last.depth * (0.01 + 2.0 * (abs(depth_gradient.x) + abs(depth_gradient.y))) + 0.1;
@@ -64,15 +66,32 @@ History history_at(ivec2 pixel, uint guide, vec2 depth_gradient) {
         ivec2 offset = ivec2(i & 1, i >> 1);
         float weight = (offset.x == 1 ? part.x : 1.0 - part.x) * (offset.y == 1 ? part.y : 1.0 - part.y);
         // weights near 0 are rounding errors of a position at the centre of a pixel
-        add_tap(h, ivec2(low) + offset, normal, range, weight < 1.0e-3 ? 0.0 : weight);
+        add_tap(h, texels, ivec2(low) + offset, normal, range, weight < 1.0e-3 ? 0.0 : weight);
     }
-    if (h.weight < 0.01) return NONE;
+    if (h.weight < 0.01) return NO_HISTORY;
     float scale = 1.0 / h.weight;
     h.light.green = (h.light.green - CODE_GREY * h.light.level) * (CODE_SCALE * scale);
     h.light.red = (h.light.red - CODE_GREY * h.light.level) * (CODE_SCALE * scale);
     h.light.level *= scale;
     h.light.variance *= scale;
     h.frames *= scale;
+    return h;
+}
+
+// History of a pixel. Of what the other eye shows, too, it has the other's where it has none, and a part of the other's
+// bounced light where its own is not fresh (Willberger et al., section 26.7.1).
+History history_at(ivec2 pixel, uint guide, float depth, vec2 depth_gradient, bool is_fresh) {
+    History h = NO_HISTORY;
+    if ((DENOISE.flags & DENOISE_HISTORY) != 0) h = history_in(LightTexels(DENOISE.history), last_pixel_of(pixel), guide, depth_gradient);
+    if (SHARED_EYES == 0 || h.weight > 0.0 && is_fresh) return h;
+    History other = history_in(LightTexels(DENOISE.other_eye), LastPixel(other_eye_pixel(pixel, depth), depth), guide, depth_gradient);
+    if (other.weight == 0.0) return h;
+    if (h.weight == 0.0) return other;
+    h.light.level.y = mix(h.light.level.y, other.light.level.y, OTHER_EYE);
+    h.light.green.y = mix(h.light.green.y, other.light.green.y, OTHER_EYE);
+    h.light.red.y = mix(h.light.red.y, other.light.red.y, OTHER_EYE);
+    h.light.variance.y = mix(h.light.variance.y, other.light.variance.y, OTHER_EYE);
+    h.frames.y = mix(h.frames.y, other.frames.y, OTHER_EYE);
     return h;
 }
 
@@ -177,7 +196,7 @@ void main() {
         keep_sample(stratum, pixel, surface, luminances);
     }
 
-    History h = history_at(pixel, light.guide, depth_gradient);
+    History h = history_at(pixel, light.guide, depth, depth_gradient, is_fresh);
     vec2 frames = vec2(0.0), variance = vec2(0.0);
     if (h.weight > 0.0) {
         frames = h.frames;

@@ -13,6 +13,8 @@ const COMPARED: [&str; 7] = [
     "rt_bounceScreen",
     "rt_bounceThickness",
     "rt_bounceAdaptive",
+    "rt_foveation",
+    "rt_shareEyes",
     "rt_bounceRoulette",
     "rt_lightSelection",
 ];

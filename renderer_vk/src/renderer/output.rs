@@ -13,7 +13,7 @@ use crate::gpu::{ColorMask, Encoding, Format, Image, ImageDesc, ImageUsage, Reco
 use crate::half::half;
 use crate::raster::{self, Display, Present};
 use crate::scene::Statistics;
-use crate::settings::{Look, Settings};
+use crate::settings::{Anaglyph, Look, Settings};
 use crate::stereo::Eye;
 use crate::trace::TraceLook;
 
@@ -81,6 +81,14 @@ impl Renderer {
         // the second eye draws over the first eye's picture
         if self.settings.clear && self.queue.is_empty() {
             self.queue.push((Item::Clear(CLEAR), ColorMask::ALL));
+        }
+    }
+
+    /// Eyes for which a frame is drawn, in this order, each with [`begin_frame`](Self::begin_frame).
+    pub fn eyes(&self) -> &'static [Eye] {
+        match self.settings.anaglyph {
+            Anaglyph::None => &[Eye::Both],
+            _ => &[Eye::Left, Eye::Right],
         }
     }
 

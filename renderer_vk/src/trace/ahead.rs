@@ -5,7 +5,7 @@ use super::pass_set::PassSet;
 use super::passes::{Pass, Switch};
 use super::{antialias, denoise, indirect, light_selection, photons, screen};
 use crate::gpu::Error;
-use crate::settings::{DenoiserChoice, Settings};
+use crate::settings::{Anaglyph, DenoiserChoice, Settings};
 
 /// Passes that the settings decide about, or that every frame runs, the slowest to compile first. Others are
 /// compiled when a frame first runs them.
@@ -136,13 +136,17 @@ fn states(pass: Pass, settings: &Settings, needs: MapNeeds) -> Vec<usize> {
             Switch::Adaptive => indirect::is_adaptive(settings),
             Switch::Roulette => settings.rt_bounce_roulette,
             Switch::LightTree => light_selection::uses_tree(settings),
+            Switch::SharedEyes => settings.rt_share_eyes && settings.anaglyph != Anaglyph::None,
         };
         if !on {
             continue;
         }
         let with = states.iter().map(|state| state | 1 << bit).collect();
-        if matches!(switch, Switch::LitFog | Switch::ScreenHits) {
-            // fog out of sight is not lit; the first frame has no last picture
+        if matches!(
+            switch,
+            Switch::LitFog | Switch::ScreenHits | Switch::SharedEyes
+        ) {
+            // fog out of sight is not lit; the first frame has no last picture; the first eye has no other
             states.extend::<Vec<usize>>(with);
         } else {
             states = with;

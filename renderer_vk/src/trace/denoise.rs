@@ -42,6 +42,24 @@ enum Tier {
     Sparse,
 }
 
+/// Filtered light of one eye, for the other.
+#[derive(Clone, Copy, Debug)]
+pub struct OtherEye {
+    history: u64,
+    size: [u32; 2],
+    convergence: f32,
+}
+
+impl OtherEye {
+    /// The light of an eye whose picture coincides with the other's at a distance, units.
+    pub fn converging(self, convergence: f32) -> Self {
+        Self {
+            convergence,
+            ..self
+        }
+    }
+}
+
 /// Images for one size of view: 25 bytes a pixel for the adaptive filter, 8 for the sparse one. Light is stored with
 /// its guide, for the adaptive filter also with its variance.
 struct Images {
@@ -197,6 +215,16 @@ impl Denoiser {
         images.adaptive.as_ref().map(|adaptive| &adaptive.past)
     }
 
+    /// The light of the last frame with the adaptive filter, for the other eye.
+    pub fn light(&self) -> Option<OtherEye> {
+        let images = self.images.as_ref().filter(|_| self.history)?;
+        images.adaptive.as_ref().map(|_| OtherEye {
+            history: images.history.address(),
+            size: images.size,
+            convergence: 0.0,
+        })
+    }
+
     /// The images, if this frame has gradient samples.
     fn gradient_images(&self) -> Option<&Images> {
         let wanted = self.history && self.gradients && self.repeats;
@@ -206,8 +234,8 @@ impl Denoiser {
     }
 
     /// Parameters of the passes. `last_seed`: random seed of the last frame; `targets`: images of the view, whose
-    /// scratch memory holds gradients, then light that is being filtered.
-    pub fn view(&self, last_seed: u32, targets: &Targets) -> DenoiseView {
+    /// scratch memory holds gradients, then light that is being filtered; `other`: light of the other eye.
+    pub fn view(&self, last_seed: u32, targets: &Targets, other: Option<&OtherEye>) -> DenoiseView {
         let nothing = self.nothing.storage_index();
         let empty = DenoiseView {
             flags: 0,
@@ -239,7 +267,10 @@ impl Denoiser {
         };
         let strata = images.size.map(|s| u64::from(s.div_ceil(STRATUM)));
         let strata = strata[0] * strata[1];
+        let other = other.filter(|other| other.size == images.size);
         DenoiseView {
+            other_eye: other.map_or(0, |other| other.history),
+            convergence: other.map_or(0.0, |other| other.convergence),
             samples: adaptive.samples.storage_index(),
             sample_surfaces: adaptive.sample_surfaces.storage_index(),
             gradient_pixels: adaptive.gradient_pixels.storage_index(),

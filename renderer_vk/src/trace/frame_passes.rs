@@ -42,6 +42,8 @@ pub struct FrameFacts {
     pub roulette: bool,
     /// Lights are drawn from a tree.
     pub light_tree: bool,
+    /// The other eye's light is known.
+    pub shared_eyes: bool,
 }
 
 impl FrameFacts {
@@ -58,6 +60,7 @@ impl FrameFacts {
             Switch::Timed => self.timed,
             Switch::BlueNoise => self.blue_noise,
             Switch::LightTree => self.light_tree,
+            Switch::SharedEyes => self.shared_eyes,
         }
     }
 

@@ -336,6 +336,14 @@ impl TraceLook {
             flares,
         };
         let slope = scene.view.stereo.slope;
+        let other = if slope < 0.0 {
+            Some(&self.tracer)
+        } else {
+            self.right.as_deref()
+        };
+        let shared = other
+            .filter(|_| slope != 0.0)
+            .and_then(|other| other.for_other_eye(scene, settings));
         let tracer = if slope < 0.0 {
             match &mut self.right {
                 Some(made) => made,
@@ -351,6 +359,7 @@ impl TraceLook {
             }
             &mut self.tracer
         };
+        tracer.take_other_eye(shared, scene);
         let bit = |on: bool, bit: u32| if on { bit } else { 0 };
         tracer.channels = bit(mask.red, 1) | bit(mask.green, 2) | bit(mask.blue, 4);
         let view = TracedView {

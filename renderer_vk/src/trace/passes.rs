@@ -71,6 +71,8 @@ pub enum Switch {
     Roulette,
     /// Lights are drawn from a tree (`rt_lightSelection 2`).
     LightTree,
+    /// The other eye's light of this frame is known (`rt_shareEyes`).
+    SharedEyes,
 }
 
 /// Declaration of a pass.
@@ -131,7 +133,7 @@ macro_rules! passes {
         /// Declarations, in the order of [`Pass`].
         pub static TABLE: &[Row] = {
             #[allow(clippy::enum_glob_use)] // rows name many of them
-            use {Resource::*, Shader::{Compute, Rays}, Switch::{Adaptive, BlueNoise, Bounces, Caustics, Gloss, LightTree, LitFog, MapFog, Roulette, Timed}};
+            use {Resource::*, Shader::{Compute, Rays}, Switch::{Adaptive, BlueNoise, Bounces, Caustics, Gloss, LightTree, LitFog, MapFog, Roulette, SharedEyes, Timed}};
             &[$(Row { $($field: $value,)* ..Row::of(concat!($($about),+), $name, $shader, Size::$size) }),+]
         };
     };
@@ -252,6 +254,7 @@ passes! {
     }
     /// Selects the cells that gather bounced light (`rt_bounceAdaptive`).
     BounceSelect = "trace_bounce_select", Compute(&shaders::TRACE_BOUNCE_SELECT_COMP), Cells {
+        switches: &[(ids::subsample::SHARED_EYES, SharedEyes)],
         reads: &[GBuffer, Positions, Normals],
         writes: &[SelectedCells],
     }
@@ -327,7 +330,7 @@ passes! {
     }
     /// A-SVGF: joins the light with that of earlier frames.
     Temporal = "trace_temporal", Compute(&shaders::TRACE_TEMPORAL_COMP), Traced {
-        switches: &[(ids::temporal::BOUNCES, Bounces), (ids::subsample::ADAPTIVE, Adaptive)],
+        switches: &[(ids::temporal::BOUNCES, Bounces), (ids::subsample::ADAPTIVE, Adaptive), (ids::subsample::SHARED_EYES, SharedEyes)],
         reads: &[GBuffer, Positions, Normals, DirectLight, IndirectLight],
         may_read: &[GradientPixels, Gradients, SelectedCells],
         writes: &[FreshLight, DepthGradient, Past],

@@ -13,7 +13,7 @@ use super::antialias::{self, Antialias, traced_size};
 use super::bloom::Bloom;
 use super::blue_noise::BlueNoise;
 use super::counters::RayCounters;
-use super::denoise::{self, Denoiser};
+use super::denoise::{self, Denoiser, OtherEye};
 use super::fog::LitFog;
 use super::frame_passes::{FrameFacts, FramePasses};
 use super::geometry::StaticGeometry;
@@ -30,13 +30,15 @@ use super::reservoirs::Reservoirs;
 use super::screen::LastScreen;
 use super::specular::SpecularTable;
 use super::targets::{OwnImages, Targets};
+use crate::api::DynamicLight;
 use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
 use crate::scene::TracedScene;
 use crate::settings::{DebugOutput, DenoiserChoice, Settings};
+use crate::stereo::Stereo;
 use crate::world::outside;
 use content::content_hash;
-use parameters::{Prepared, camera_frame, portal_record};
+use parameters::{Prepared, camera_frame, portal_record, stereo_camera};
 
 /// The map that a view shows.
 #[derive(Clone, Copy)]
@@ -100,6 +102,10 @@ pub struct ViewTracer {
     last_time: f32,
     /// Camera of the last frame, if its light is valid history.
     pub(super) history: Option<CameraView>,
+    /// Dynamic lights of the last frame.
+    dynamic_lights: Vec<DynamicLight>,
+    /// Light of the other eye, drawn before in this frame.
+    other_eye: Option<OtherEye>,
     /// Hash of the content of the accumulated frames, and their number.
     accumulated: (u64, u32),
     /// Number of next frames that join the mean whatever their content.
@@ -155,6 +161,8 @@ impl ViewTracer {
             frame: 0,
             last_time: 0.0,
             history: None,
+            dynamic_lights: Vec::new(),
+            other_eye: None,
             accumulated: (0, 0),
             joining: 0,
         })
@@ -195,6 +203,28 @@ impl ViewTracer {
     /// Lets the next `frames` accumulated frames join the mean whatever they show.
     pub fn join_frames(&mut self, frames: u32) {
         self.joining = frames;
+    }
+
+    /// The light of the last frame for the other eye, if that frame showed this view from its own eye's place.
+    pub fn for_other_eye(&self, view: &TracedScene, settings: &Settings) -> Option<OtherEye> {
+        let camera = &view.view;
+        let opposite = Stereo {
+            slope: -camera.stereo.slope,
+            ..camera.stereo
+        };
+        let drawn = stereo_camera(camera, opposite);
+        let same = settings.rt_share_eyes && self.history == Some(drawn);
+        let light = self
+            .denoiser
+            .light()
+            .filter(|_| same && self.last_time == view.time);
+        light.map(|light| light.converging(camera.stereo.distance))
+    }
+
+    /// Takes over the light of the other eye for the next frame, unless the game is paused: both eyes would then blur
+    /// each other's light more and more.
+    pub fn take_other_eye(&mut self, light: Option<OtherEye>, view: &TracedScene) {
+        self.other_eye = light.filter(|_| self.last_time != view.time);
     }
 
     /// Discards accumulated frames and light samples: lights have changed.
@@ -267,6 +297,7 @@ impl ViewTracer {
         self.frame = self.frame.wrapping_add(1);
         self.last_time = view.scene.time;
         self.history = (!settings.rt_accumulate).then(|| camera_frame(view.scene));
+        (self.dynamic_lights).clone_from(&view.scene.dlights);
         self.denoiser.advance();
         self.reservoirs.advance();
         self.fog.advance();
@@ -433,6 +464,7 @@ impl ViewTracer {
             adaptive: indirect::is_adaptive(settings),
             roulette: settings.rt_bounce_roulette,
             light_tree: uses_tree(settings),
+            shared_eyes: params.denoise.other_eye != 0,
         }
     }
 

@@ -52,6 +52,8 @@ pub struct DenoiseView {
     pub gradient_samples: u64,
     /// Change and size of direct and indirect light, summed around each stratum: 8 bytes a stratum.
     pub gradient_sums: u64,
+    /// Light history of the other eye of this frame, in the same form; 0: none.
+    pub other_eye: u64,
     /// `DENOISE_*` bits.
     pub flags: u32,
     /// Seed of the last frame's random numbers.
@@ -73,6 +75,10 @@ pub struct DenoiseView {
     pub past: u32,
     /// R32UI, one texel for each cell of 2 × 2 pixels: 1 if it gathers bounced light in this frame.
     pub selected: u32,
+    /// Distance at which the pictures of both eyes coincide, units.
+    pub convergence: f32,
+    /// To a multiple of eight bytes.
+    pub padding: u32,
 }
 
 /// What bounces of the next frame take from this one; bindless indices of images.

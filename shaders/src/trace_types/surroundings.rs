@@ -96,8 +96,8 @@ pub struct TransportView {
     pub bounce_samples: f32,
     /// 1: paths may end at their first ray, so that it has a throughput.
     pub roulette: u32,
-    /// To a multiple of eight bytes.
-    pub padding: u32,
+    /// Part of `bounce_samples` that the corners of the picture need less than its centre.
+    pub foveation: f32,
 }
 
 /// The flares of a view.

@@ -9,6 +9,7 @@ mod coplanar;
 mod cut_outs;
 mod denoising;
 mod dielectrics;
+mod eyes;
 mod fewer_rays;
 mod fog;
 mod gradients;

@@ -26,6 +26,7 @@ pub(super) fn on_screen(bounces: u32) -> Settings {
         rt_taa: false,
         rt_denoiser: DenoiserChoice::ASvgf,
         rt_bounce_screen: 64,
+        rt_bounce_adaptive: 0,
         ..bounced(bounces)
     }
 }

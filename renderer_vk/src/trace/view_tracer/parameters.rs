@@ -12,8 +12,9 @@ use super::super::indirect::{self, is_subsampled};
 use super::{DARK_ADAPTATION, LIGHT_ADAPTATION, TracedMap, TracedView, ViewTracer};
 use crate::gpu::{Error, Image, Recorder};
 use crate::raster::{FlareTest, WIDE_FORMAT};
-use crate::scene::{SUN_SIZE, TracedScene, perpendicular};
+use crate::scene::{SUN_SIZE, TracedScene, View, perpendicular};
 use crate::settings::{MOST_BOUNCES, Settings};
+use crate::stereo::Stereo;
 use crate::trace::accel::AccelOutput;
 use crate::trace::beyond_sky::Beyond;
 use crate::trace::layer_boxes::in_sight;
@@ -69,7 +70,11 @@ impl ViewTracer {
                 .unwrap_or_default(),
             reservoirs: self.reservoirs.view(lights.lasting()),
             motion: prepared.motion,
-            denoise: (self.denoiser).view(self.frame.wrapping_sub(1), targets),
+            denoise: (self.denoiser).view(
+                self.frame.wrapping_sub(1),
+                targets,
+                self.other_eye.as_ref(),
+            ),
             flares: FlareView {
                 flares: flares.flares,
                 states: flares.states,
@@ -96,6 +101,16 @@ impl ViewTracer {
             },
             accumulated,
         })
+    }
+
+    /// Samples of bounced light that a history needs. Whether dynamic lights have changed is known before a ray finds it:
+    /// then every cell gathers, so that their bounced light does not lag.
+    fn bounce_samples(&self, view: &TracedScene, settings: &Settings) -> f32 {
+        if self.dynamic_lights == view.dlights {
+            settings.rt_bounce_adaptive as f32
+        } else {
+            f32::MAX
+        }
     }
 
     /// Boxes that rays are tested against: around translucent layers, geometry behind skies, and surfaces that filter
@@ -142,9 +157,9 @@ impl ViewTracer {
             specular_albedo: self.specular_table.address(),
             specular_bounces: indirect::specular_bounces(settings, materials.has_metal()),
             specular_estimator: self.specular_estimator,
-            bounce_samples: settings.rt_bounce_adaptive as f32,
+            bounce_samples: self.bounce_samples(view, settings),
+            foveation: settings.rt_foveation,
             roulette: u32::from(settings.rt_bounce_roulette),
-            padding: 0,
             filters: geometry.map_or(0, |g| g.surroundings.filters()),
             filter_count: geometry.map_or(0, |g| g.surroundings.filter_count()),
             layers,
@@ -297,10 +312,14 @@ fn mirror_count(map: &TracedMap<'_>, view: &TracedScene, settings: &Settings) ->
 
 /// The camera of a view, as two frames must share it to show equal directions.
 pub(super) fn camera_frame(view: &TracedScene) -> CameraView {
-    let camera = &view.view;
+    stereo_camera(&view.view, view.view.stereo)
+}
+
+/// The same with another stereo offset.
+pub(super) fn stereo_camera(camera: &View, stereo: Stereo) -> CameraView {
     let [forward, left, up] = camera.axis;
     CameraView {
-        origin: camera.origin + left * camera.stereo.offset(),
+        origin: camera.origin + left * stereo.offset(),
         forward,
         left: left * camera.tan_x,
         up: up * camera.tan_y,

@@ -4,18 +4,20 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::Vec3;
 use shaders::trace_types::CameraView;
+use shaders::trace_types::constants as t;
 use testkit::Need;
 
 use super::half;
-use super::scene::Scene;
+use super::scene::{Scene, Uploaded};
 use crate::api::RefDef;
 use crate::gpu::{
     Device, DeviceOptions, Filter, Format, FrameRing, Image, ImageDesc, ImageUsage, MipFilter,
-    SamplerDesc, SurfaceSource, Wrap,
+    Recorder, SamplerDesc, SurfaceSource, Wrap,
 };
 use crate::raster::FlareTest;
 use crate::scene::{TracedScene, View};
 use crate::settings::Settings;
+use crate::stereo::Eye;
 use crate::trace::pass_set::PassSet;
 use crate::trace::passes::COUNTERS;
 use crate::trace::tracer::Tracer;
@@ -243,27 +245,18 @@ impl Gpu {
             change(frame, &mut view);
             view.view = View::new(&view.def, 4.0, 10000.0);
             let mut rec = self.ring.begin().expect("frame");
-            let map = TracedMap {
-                geometry: &uploaded.geometry,
-                lights: &uploaded.lights,
-                flares: FlareTest::default(),
-            };
-            self.look
-                .record_view(
-                    &mut rec,
-                    TracedView {
-                        scene: &view,
-                        map: Some(map),
-                        materials: &uploaded.materials,
-                        settings,
-                        target: &target,
-                    },
-                )
-                .expect("recorded");
+            record(
+                &mut self.look,
+                &mut rec,
+                &uploaded,
+                &view,
+                settings,
+                &target,
+            );
             self.ring.end(rec).expect("submitted");
             if let Some(watch) = &mut watch {
                 self.device.wait_idle().expect("done");
-                watch(frame, &self.linear_picture());
+                watch(frame, &self.linear_picture(&self.look));
             }
         }
         self.device.wait_idle().expect("done");
@@ -274,7 +267,7 @@ impl Gpu {
                 "nothing changed between the frames"
             );
         }
-        let linear = self.linear_picture();
+        let linear = self.linear_picture(&self.look);
         let picture: Vec<[u8; 4]> =
             bytemuck::pod_collect_to_vec(&self.device.read_image(&target).expect("read"));
         self.check_messages();
@@ -283,9 +276,65 @@ impl Gpu {
         (linear, picture)
     }
 
-    /// The picture of the last frame before exposure.
-    fn linear_picture(&self) -> Vec<Vec3> {
-        let hdr = self.look.hdr().expect("traced");
+    /// Frames for both eyes, `settings.stereo_separation` apart: the second eye's pictures before exposure, and the rays
+    /// of its bounces in each frame, a few frames late. `forgets`: the second eye has no history.
+    pub fn render_eyes(
+        &mut self,
+        scene: &Scene,
+        settings: &Settings,
+        frames: u32,
+        forgets: bool,
+    ) -> Vec<(Vec<Vec3>, u64)> {
+        let uploaded = scene.upload(&self.device, self.tracer);
+        let [width, height] = [scene.def.width as u32, scene.def.height as u32];
+        let usage = ImageUsage::STORAGE | ImageUsage::COLOR;
+        let target = Image::new(
+            &self.device,
+            &ImageDesc::new("test target", width, height, Format::Rgba8, usage),
+        )
+        .expect("target");
+        let mut right = ViewTracer::new(&self.passes).expect("a device");
+        right.count_rays = true;
+        let mut seen = Vec::new();
+        for frame in 0..frames {
+            let mut views = [Eye::Left, Eye::Right].map(|eye| {
+                let mut view = scene.view();
+                // accumulated frames show one time
+                let time = if settings.rt_accumulate { 0 } else { frame };
+                view.time = 0.02 * time as f32;
+                view.view = View::new(&view.def, 4.0, 10000.0).with_stereo(eye.stereo(settings));
+                view
+            });
+            if forgets {
+                right.reset();
+            }
+            let mut rec = self.ring.begin().expect("frame");
+            let [first, second] = &mut views;
+            record(
+                &mut self.look,
+                &mut rec,
+                &uploaded,
+                first,
+                settings,
+                &target,
+            );
+            right.take_other_eye(self.look.for_other_eye(second, settings), second);
+            record(&mut right, &mut rec, &uploaded, second, settings, &target);
+            self.ring.end(rec).expect("submitted");
+            self.device.wait_idle().expect("done");
+            let rays = right
+                .rays()
+                .map_or(0, |rays| rays[t::COUNT_BOUNCE_RAYS as usize]);
+            seen.push((self.linear_picture(&right), rays));
+        }
+        self.check_messages();
+        self.look.reset();
+        seen
+    }
+
+    /// The picture of a tracer's last frame before exposure.
+    fn linear_picture(&self, tracer: &ViewTracer) -> Vec<Vec3> {
+        let hdr = tracer.hdr().expect("traced");
         let bytes = self.device.read_image(hdr).expect("read");
         let floats: Vec<f32> = if hdr.format() == Format::Rgba32F {
             bytemuck::pod_collect_to_vec(&bytes)
@@ -373,4 +422,28 @@ fn place(
     let away = Vec3::from(steps.map(|n| (n as f32 - (1 << 19) as f32) * step));
     let place = camera.origin + ray * distance + away;
     [place.x, place.y, place.z, distance]
+}
+
+/// Records a view of a scene.
+fn record(
+    tracer: &mut ViewTracer,
+    rec: &mut Recorder,
+    uploaded: &Uploaded,
+    view: &TracedScene,
+    settings: &Settings,
+    target: &Image,
+) {
+    let map = TracedMap {
+        geometry: &uploaded.geometry,
+        lights: &uploaded.lights,
+        flares: FlareTest::default(),
+    };
+    let view = TracedView {
+        scene: view,
+        map: Some(map),
+        materials: &uploaded.materials,
+        settings,
+        target,
+    };
+    tracer.record_view(rec, view).expect("recorded");
 }
