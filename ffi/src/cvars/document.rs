@@ -7,7 +7,7 @@ use super::{UNUSED, flags};
 use renderer_vk::settings::{Kind, PRESETS, Preset, Spec};
 
 /// Settings that exist to compare techniques. The page that compares them has their table, not that of players.
-const COMPARED: [&str; 7] = [
+const COMPARED: &[&str] = &[
     "rt_gridCells",
     "rt_blueNoise",
     "rt_bounceScreen",
