@@ -8,7 +8,7 @@ use relight::CalibrationCache;
 
 use super::lights::{Editor, lights_path};
 use super::source::{Changed, Finder, Progress};
-use super::state::{FOV, Map, Shown, Viewer};
+use super::state::{FOV, Map, Viewer};
 use crate::scripts::load_scripts;
 use crate::view::{self, Camera};
 
@@ -83,7 +83,7 @@ impl Viewer {
 
     /// Begins the search for lights, or takes over its result.
     pub(super) fn follow_finder(&mut self) {
-        if self.map.is_none() || self.found || self.shown == Shown::Classic {
+        if self.map.is_none() || self.found || !self.shown.is_traced() {
             return;
         }
         let finder = self.finder.get_or_insert_with(|| {

@@ -25,7 +25,7 @@ use state::{Shown, Start};
 /// Show a map in a window: fly and walk through it, compare looks, change settings and lights
 ///
 /// Needs no engine. W A S D move, Q and E go down and up, Shift is faster, the mouse turns while a button is held, a
-/// click names the surface; 1 to 4 switch the look, G walks, H hides the panel. The window reloads the map when its
+/// click names the surface; 1 to 5 switch the look, G walks, H hides the panel. The window reloads the map when its
 /// files change.
 ///
 /// Examples: relight view oa_dm1; relight view my.bsp --look split; relight view --sample

@@ -45,6 +45,7 @@ impl Viewer {
             (Key::Num2, Shown::Traced),
             (Key::Num3, Shown::Split),
             (Key::Num4, Shown::Reference),
+            (Key::Num5, Shown::Hybrid),
         ] {
             if pressed(key) {
                 self.shown = shown;
@@ -87,6 +88,7 @@ impl Viewer {
         }
         let look = match self.shown {
             Shown::Classic => "classic",
+            Shown::Hybrid => "hybrid",
             Shown::Traced | Shown::Split | Shown::Reference => "traced",
         };
         let (width, height) = self.view().map_or(self.renderer.size(), |def| {
@@ -132,6 +134,7 @@ impl Viewer {
                 (Shown::Traced, "Traced"),
                 (Shown::Split, "Split"),
                 (Shown::Reference, "Reference"),
+                (Shown::Hybrid, "Hybrid"),
             ] {
                 ui.selectable_value(&mut self.shown, shown, name);
             }
@@ -176,7 +179,7 @@ impl Viewer {
 
     /// What is not complete yet.
     fn progress(&self, ui: &mut Ui) {
-        if self.shown == Shown::Classic {
+        if !self.shown.is_traced() {
             return;
         }
         if let Some(finder) = self.finder.as_ref().filter(|_| !self.can_trace()) {

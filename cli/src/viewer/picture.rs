@@ -162,7 +162,7 @@ impl Viewer {
             );
             return;
         }
-        if self.shown != Shown::Classic && !self.can_trace() {
+        if self.shown.is_traced() && !self.can_trace() {
             painter.text(
                 rect.center_top() + egui::vec2(0.0, 24.0),
                 Align2::CENTER_TOP,

@@ -35,6 +35,15 @@ pub enum Shown {
     Split,
     /// Ray traced, the mean of all frames since the camera moved.
     Reference,
+    /// The classic look with traced shadows of models and lights, and traced reflections.
+    Hybrid,
+}
+
+impl Shown {
+    /// Whether it shows the traced look, which needs the lights of the map.
+    pub(super) fn is_traced(self) -> bool {
+        !matches!(self, Self::Classic | Self::Hybrid)
+    }
 }
 
 /// Options of a viewer.
@@ -234,7 +243,7 @@ impl Viewer {
     /// Whether the picture is what was requested: the look is complete, and calm or averaged.
     pub fn is_ready(&self) -> bool {
         let calm = match self.shown {
-            Shown::Classic => 2,
+            Shown::Classic | Shown::Hybrid => 2,
             Shown::Traced | Shown::Split => CALM,
             Shown::Reference => self.wanted_frames,
         };
@@ -430,8 +439,12 @@ impl Viewer {
 
     /// Draws the looks, then the panels.
     fn draw(&mut self, ui: renderer_vk::api::UiFrame) -> Result<()> {
-        let traces = self.shown != Shown::Classic && self.found;
-        self.settings.rt = if traces { Look::Traced } else { Look::Classic };
+        let traces = self.shown.is_traced() && self.found;
+        let drawn = match self.shown {
+            Shown::Hybrid => Look::Hybrid,
+            _ => Look::Classic,
+        };
+        self.settings.rt = if traces { Look::Traced } else { drawn };
         self.settings.rt_accumulate = self.shown == Shown::Reference;
         self.renderer.set_settings(&self.settings);
         self.renderer.begin_frame((self.time * 1000.0) as i32);
@@ -456,12 +469,12 @@ impl Viewer {
                 let width = (def.width as f32 * self.split) as i32;
                 let part = traces.then_some([def.x, def.y, width, def.height]);
                 view(&RefDef {
-                    look: Some(Look::Classic),
+                    look: Some(drawn),
                     part,
                     ..def
                 })?;
             }
-            let complete = traces || self.shown == Shown::Classic;
+            let complete = traces || !self.shown.is_traced();
             self.complete_frames = match (complete, self.shown) {
                 (false, _) => 0,
                 (true, Shown::Reference) => self.renderer.accumulated_frames(),

@@ -196,6 +196,14 @@ fn mouse_and_keys_move_pick_and_split() {
     viewer.animates = false;
     frame(&mut viewer, []);
     let classic = viewer.picture().unwrap();
+    // without moving models and lights the hybrid look is the classic one but for the environment images of
+    // the floor and the globe
+    press(&mut viewer, Key::Num5);
+    until(&mut viewer, "no hybrid look", Viewer::is_ready);
+    assert!(viewer.command().contains("--look hybrid"));
+    let hybrid = viewer.picture().unwrap();
+    let apart = difference(&classic, &hybrid, 10, SIZE.0 - 10);
+    assert!(apart > 0.5 && apart < 4.0, "{apart}");
     press(&mut viewer, Key::Num3);
     until(&mut viewer, "no traced look", Viewer::is_ready);
     let split = viewer.picture().unwrap();
