@@ -3,7 +3,8 @@
 // Method: Karis, High-Quality Temporal Supersampling (SIGGRAPH 2014 course). Variance clipping: Salvi, An Excursion in
 // Temporal Supersampling (GDC 2016). Weights of the samples of a coarser grid by distance from the pixel: Yang, Liu,
 // Salvi, A Survey of Temporal Antialiasing Techniques (Eurographics 2020), sections 4 and 5. Interpolation of the
-// newest frame in motion: Dodgson, Quadratic Interpolation for Image Resampling (1997).
+// newest frame in motion: Dodgson, Quadratic Interpolation for Image Resampling (1997). Smoothed maximum of the range:
+// Willberger, Musterle, Bergmann, Deferred Hybrid Path Tracing, Ray Tracing Gems (2019), section 26.5.1.
 //
 // Glow in front of a surface that moves differently from the surface has no history. Its share of the colour is taken
 // from the newest frame alone (like the reactive mask of AMD's FidelityFX Super Resolution 2).
@@ -13,6 +14,9 @@
 #include "trace/denoise.glsl"
 #include "trace/exposure.glsl"
 #include "trace/motion.glsl"
+
+// 1: the greatest luminance of the colour range is smoothed over time. 0 removes the code.
+layout(constant_id = 15) const uint SMOOTH_MAXIMUM = 0;
 
 const int GROUP = 16;
 // Traced pixels that a work group may read along one axis: one for each of its pixels, and one more on each side.
@@ -141,6 +145,9 @@ vec3 history_in_current_light(vec3 color, ivec2 pixel, float view_distance) {
     return (color - front) * ratio + front;
 }
 
+// Brings the luminance of a colour (YCoCg) down to a bound; the hue stays.
+vec3 darkened(vec3 color, float most) { return color.x > most ? color * (most / color.x) : color; }
+
 void main() {
     ivec2 output_size = ivec2(VIEW.antialias.output_width, VIEW.antialias.output_height);
     ivec2 traced_size = ivec2(VIEW.width, VIEW.height);
@@ -200,17 +207,24 @@ void main() {
     Motion motion = motion_read(clamp(middle + nearest_at, ivec2(0), traced_size - 1));
     vec2 last_place = vec2(pixel) + 0.5 + motion.offset / ratio;
     vec3 old = mean;
-    float frames = 0.0;
+    float frames = 0.0, maximum = 0.0;
     bool known = VIEW.antialias.history != 0 && motion.last_view_distance >= 0.0
         && all(greaterThanEqual(last_place, vec2(0.0))) && all(lessThan(last_place, vec2(output_size)));
     bool rests = motion.offset == vec2(0.0), is_fine = traced_size == output_size;
+    float range = rests ? REST_RANGE : MOVING_RANGE;
+    // of a line that is brighter than the range the pixel's own sample
+    if (SMOOTH_MAXIMUM != 0) maximum = max(mean.x + deviation.x * range, tile[middle.y - first.y][middle.x - first.x].x);
     if (known && was_seen(last_place * ratio, motion.last_view_distance, rests, mark_field(motion.mark) > 0.0)) {
         vec4 history = last_bicubic(last_place, vec2(output_size));
         if (rests) history.rgb = history_in_current_light(history.rgb, middle, view_distance_read(middle));
         old = to_ycocg(compress(history.rgb, exposure));
-        float range = rests ? REST_RANGE : MOVING_RANGE;
         vec3 off = old - mean;
         vec3 parts = abs(off) / (deviation * range + 1.0e-4);
+        if (SMOOTH_MAXIMUM != 0) {
+            float last = imageLoad(images_r16f[VIEW.antialias.last_maximum], ivec2(last_place)).x;
+            maximum = mix(maximum, last, VIEW.antialias.maximum_kept);
+            if (off.x > 0.0) parts.x = off.x / max(maximum - mean.x, 1.0e-4);
+        }
         old = mean + off / max(max_component(parts), 1.0);
         // the history contributes only the fraction that is not new
         float kept = rests ? REST_FRAMES : mark_bent(motion.mark) ? BENT_FRAMES : is_fine ? MOVING_FRAMES : COARSE_MOVING_FRAMES;
@@ -223,6 +237,11 @@ void main() {
     } else if (frames > 0.0) {
         confidence = mix(min(narrow.w, 1.0), 1.0, fresh);
         if (narrow.w > 1.0e-3) now = mix(narrow.rgb / narrow.w, now, fresh);
+    }
+    if (SMOOTH_MAXIMUM != 0) {
+        // an edge in motion may be at another texel than the last maximum; ripples under a camera at rest have no offset
+        if (frames > 0.0 && all(lessThanEqual(abs(motion.offset), vec2(LEAST_OFFSET)))) now = darkened(now, maximum);
+        imageStore(images_r16f[VIEW.antialias.maximum], pixel, vec4(maximum));
     }
     float total = frames + confidence;
     vec3 color = mix(old, now, confidence / total);

@@ -17,6 +17,7 @@ const COMPARED: &[&str] = &[
     "rt_shareEyes",
     "rt_bounceRoulette",
     "rt_lightSelection",
+    "rt_taaMaximum",
 ];
 
 /// A row of a table. The help of variables without effect ends with a sentence that their table states once.

@@ -49,6 +49,11 @@ pub fn is_temporal(settings: &Settings) -> bool {
     !settings.rt_accumulate && (settings.rt_taa || settings.multisample > 1)
 }
 
+/// Whether frames with these settings keep the maximum of the colour range.
+pub fn smooths_maximum(settings: &Settings) -> bool {
+    is_temporal(settings) && settings.rt_taa_maximum > 0.0
+}
+
 /// Traced size for a picture of the size `output`, pixels. Reference pictures are traced in full size.
 pub fn traced_size(settings: &Settings, output: [u32; 2]) -> [u32; 2] {
     if settings.rt_accumulate || settings.rt_scale.is_nan() || settings.rt_scale >= 1.0 {
@@ -96,7 +101,9 @@ pub struct Antialias {
     sampler: u32,
     /// Resolved pictures of this frame and the last, while the traced picture is not shown unchanged.
     resolved: Option<[Resolved; 2]>,
-    /// The last frame left a valid resolved picture.
+    /// Greatest luminance of the colour range in this frame and the last, `R16F`, while it is smoothed.
+    maxima: Option<[Image; 2]>,
+    /// The last frame left a valid resolved picture, and the maxima if there are any.
     history: bool,
     frame: u32,
     method: Method,
@@ -119,6 +126,7 @@ impl Antialias {
                 lod_bias: 0.0,
             })?,
             resolved: None,
+            maxima: None,
             history: false,
             frame: 0,
             method: Method::Plain,
@@ -162,6 +170,7 @@ impl Antialias {
             ]);
             self.history = false;
         }
+        self.fit_maxima(device, smooths_maximum(settings), output)?;
         self.history &= history && method == self.method;
         self.method = method;
         let jittered = method == Method::Temporal && settings.rt_antialiasing;
@@ -176,6 +185,8 @@ impl Antialias {
             Some([now, _]) => &now.picture,
             None => targets.picture(),
         };
+        let [maximum, last_maximum] =
+            (self.maxima.as_ref()).map_or([0; 2], |m| [&m[0], &m[1]].map(Image::storage_index));
         Ok(AntialiasView {
             jitter: if jittered {
                 jitter(self.frame)
@@ -195,7 +206,26 @@ impl Antialias {
             texture_scale: texture_scale(settings, output, jittered),
             anisotropy: settings.anisotropy(),
             sharpness: settings.rt_sharpness,
+            maximum,
+            last_maximum,
+            maximum_kept: settings.rt_taa_maximum,
+            padding: 0,
         })
+    }
+
+    /// Makes or drops the images of the maxima.
+    fn fit_maxima(&mut self, device: &Device, needed: bool, size: [u32; 2]) -> Result<(), Error> {
+        let [width, height] = size;
+        (self.maxima).take_if(|[m, _]| !needed || [m.width(), m.height()] != size);
+        if needed && self.maxima.is_none() {
+            let make = |name| {
+                let desc = ImageDesc::new(name, width, height, Format::R16F, ImageUsage::STORAGE);
+                Image::new(device, &desc)
+            };
+            self.maxima = Some([make("trace maximum")?, make("trace last maximum")?]);
+            self.history = false;
+        }
+        Ok(())
     }
 
     /// An image as `Targets::other`, which nothing else uses before the picture is resolved; `None` if the traced
@@ -224,6 +254,9 @@ impl Antialias {
     pub fn advance(&mut self) {
         if let Some(resolved) = &mut self.resolved {
             resolved.swap(0, 1);
+        }
+        if let Some(maxima) = &mut self.maxima {
+            maxima.swap(0, 1);
         }
         self.history = self.method == Method::Temporal;
         self.frame = self.frame.wrapping_add(1);

@@ -73,6 +73,8 @@ pub enum Switch {
     LightTree,
     /// The other eye's light of this frame is known (`rt_shareEyes`).
     SharedEyes,
+    /// The maximum of the colour range of antialiasing is smoothed over time.
+    SmoothMaximum,
 }
 
 /// Declaration of a pass.
@@ -403,6 +405,7 @@ passes! {
     }
     /// Temporal antialiasing, and upscaling with it.
     Antialias = "trace_antialias", Compute(&shaders::TRACE_ANTIALIAS_COMP), Output {
+        switches: &[(ids::antialias::SMOOTH_MAXIMUM, Switch::SmoothMaximum)],
         reads: &[GBuffer, Shown, DirectLight, Picture],
         may_read: &[IndirectLight, Gradients],
         writes: &[ResolvedPicture],

@@ -131,4 +131,12 @@ pub struct AntialiasView {
     pub anisotropy: f32,
     /// Strength of sharpening, 0 to 1; 0: none.
     pub sharpness: f32,
+    /// R16F of the output's size: greatest luminance of the colour range, smoothed over time.
+    pub maximum: u32,
+    /// The same of the last frame.
+    pub last_maximum: u32,
+    /// Weight of `last_maximum`.
+    pub maximum_kept: f32,
+    /// To a multiple of eight bytes.
+    pub padding: u32,
 }

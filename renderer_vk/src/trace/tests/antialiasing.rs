@@ -16,7 +16,7 @@ const SIZE: i32 = 64;
 /// Frames accumulated for a reference picture: its standard error is one sixteenth of a single sample's.
 const TRUTH: u32 = 256;
 
-fn live() -> Settings {
+pub(super) fn live() -> Settings {
     Settings {
         rt_accumulate: false,
         rt_denoiser: DenoiserChoice::None,
@@ -48,7 +48,7 @@ fn error(a: &[[u8; 4]], b: &[[u8; 4]]) -> f64 {
 
 /// A floor of black and white squares at a grazing angle, with a few poles. All surfaces are emissive, so that only
 /// edges are noisy.
-fn checkerboard() -> Scene {
+pub(super) fn checkerboard() -> Scene {
     let mut scene = Scene::new(
         Vec3::new(-150.0, 20.0, 70.0),
         Vec3::new(60.0, 0.0, -10.0),
@@ -154,7 +154,7 @@ fn in_motion_it_stays_sharp(gpu: &mut Gpu) {
 }
 
 /// Camera position `left` frames before it arrives.
-fn walk(def: &mut RefDef, arrived: &RefDef, left: f32) {
+pub(super) fn walk(def: &mut RefDef, arrived: &RefDef, left: f32) {
     def.view_origin = arrived.view_origin + Vec3::new(-0.9, 0.6, 0.2) * left;
     let turn = Mat3::from_rotation_z(0.004 * left);
     def.view_axis = arrived.view_axis.map(|v| turn * v);
@@ -188,8 +188,8 @@ fn a_mirror_shows_what_is_seen_from_behind_it(gpu: &mut Gpu) {
     assert!(off < 0.2 * blur, "{off} {blur}");
 }
 
-/// Moving ripples on water over a floor of squares, with a moving camera and with a static one.
-fn ripples_leave_no_trail(gpu: &mut Gpu) {
+/// Water with ripples over a floor of squares.
+pub(super) fn rippled() -> Scene {
     let mut scene = checkerboard();
     let water = scene.material(&[stage::filter([1.0; 3])], LIQUID);
     scene.materials[water as usize].0.dielectric = Dielectric {
@@ -201,6 +201,12 @@ fn ripples_leave_no_trail(gpu: &mut Gpu) {
     let corner = Vec3::new(-600.0, -600.0, 40.0);
     let shape = rectangle(corner, Vec3::X * 1200.0, Vec3::Y * 1200.0);
     scene.quad(shape, water);
+    scene
+}
+
+/// Moving ripples, with a moving camera and with a static one.
+fn ripples_leave_no_trail(gpu: &mut Gpu) {
+    let scene = rippled();
     let (frames, last) = (24, 23.0);
     let run = |view: &mut TracedScene, left: f32| {
         view.time = 7.0 - 0.016 * left;
