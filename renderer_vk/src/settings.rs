@@ -194,6 +194,8 @@ settings! { variables {
     rt_foveation: f32 = "rt_foveation", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "Part of the samples of rt_bounceAdaptive that the corners of the picture save.";
     rt_share_eyes: bool = "rt_shareEyes", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 lets the second eye of r_anaglyphMode take bounced light from the first.";
     rt_bounce_roulette: bool = "rt_bounceRoulette", "0", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "1 ends paths of bounces where they have found light. Same picture in the mean.";
+    rt_bounce_ambient: f32 = "rt_bounceAmbient", "0", ARCHIVE, kept(0.0, 4.0), Frame, Restarts, "Light of further bounces at the last one: this part of the map's light grid; 0 none.";
+    rt_bounce_ambient_fall: f32 = "rt_bounceAmbientFall", "0", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "Exponential decrease of rt_bounceAmbient with the length of the last ray, 1/unit.";
     rt_exposure: f32 = "rt_exposure", "0", ARCHIVE, kept(-16.0, 16.0), Frame, GoesOn, "Exposure in stops, added to the automatic one.";
     rt_auto_exposure: bool = "rt_autoExposure", "1", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 adapts the exposure to the picture.";
     rt_bloom: f32 = "rt_bloom", "0.05", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "Part of the light that spreads around bright things; 0 none.";

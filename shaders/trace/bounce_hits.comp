@@ -5,6 +5,19 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
+// 1: light of further bounces is added at the last one. 0 removes the code.
+layout(constant_id = 16) const uint AMBIENT = 0;
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer CellLights { vec3 at[]; };
+
+// Radiance that further bounces would bring to the last vertex of a path: a part of the mean light of its cell, less
+// after a long ray (Willberger, Musterle, Bergmann, Deferred Hybrid Path Tracing, 2019, equation 3).
+vec3 ambient_light(PathVertex v, vec3 origin) {
+    uint cell = cell_at(v.position + v.face_normal);
+    float part = VIEW.transport.ambient * exp(-VIEW.transport.ambient_fall * distance(v.position, origin));
+    return CellLights(VIEW.lights.cell_light).at[cell] * (part * VIEW.lights.scale);
+}
+
 // Live, a specular path goes on for sure from this inverse specular albedo on.
 const float SURELY_SHOWN = 4.0;
 
@@ -45,6 +58,7 @@ void main() {
             if (v.chain == CHAIN_NONE) {
                 b.light = vertex_light(v);
                 b.light.light *= throughput;
+                if (AMBIENT != 0) b.found += throughput * ambient_light(v, origin);
                 if (CAUSTICS != 0) b.found += throughput * photon_light(v.position, v.face_normal, v.normal);
             } else if (v.chain == CHAIN_ROUGH) {
                 b.light = rough_light(v, LAST_BOUNCE == 0);

@@ -79,7 +79,8 @@ pub struct MeasureArgs {
     /// without temporal antialiasing
     #[arg(long, conflicts_with = "clips")]
     matrix: bool,
-    /// Error of 0, 1, 2 and 4 bounces against 8, each the mean of --reference frames
+    /// Error of 0, 1, 2 and 4 bounces against 8, each the mean of --reference frames; with rt_bounceAmbient also of 1, 2
+    /// and 4 with it
     #[arg(long, conflicts_with_all = ["cut", "matrix", "clips"])]
     bounce_counts: bool,
     /// Write pictures of a camera that walks from each place to this folder, and of the reference of each; lab/jod.py
@@ -137,7 +138,7 @@ impl MeasureArgs {
             let shown = u64::from(self.clip_frames);
             variants * (frames + shown) + shown * reference
         } else if self.bounce_counts {
-            bounces::frames(self.reference)
+            bounces::frames(base, self.reference)
         } else if self.cut {
             reference + variants * cut::frames(self.frames)
         } else if self.matrix {

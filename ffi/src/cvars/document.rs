@@ -16,6 +16,8 @@ const COMPARED: &[&str] = &[
     "rt_foveation",
     "rt_shareEyes",
     "rt_bounceRoulette",
+    "rt_bounceAmbient",
+    "rt_bounceAmbientFall",
     "rt_lightSelection",
     "rt_taaMaximum",
 ];

@@ -137,6 +137,7 @@ fn states(pass: Pass, settings: &Settings, needs: MapNeeds) -> Vec<usize> {
             Switch::Roulette => settings.rt_bounce_roulette,
             Switch::LightTree => light_selection::uses_tree(settings),
             Switch::SharedEyes => settings.rt_share_eyes && settings.anaglyph != Anaglyph::None,
+            Switch::Ambient => indirect::adds_ambient(settings),
             Switch::SmoothMaximum => antialias::smooths_maximum(settings),
         };
         if !on {

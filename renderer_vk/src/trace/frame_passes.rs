@@ -44,6 +44,8 @@ pub struct FrameFacts {
     pub light_tree: bool,
     /// The other eye's light is known.
     pub shared_eyes: bool,
+    /// The last bounce adds light of further ones.
+    pub ambient: bool,
     /// The maximum of the colour range of antialiasing is smoothed over time.
     pub smooth_maximum: bool,
 }
@@ -63,6 +65,7 @@ impl FrameFacts {
             Switch::BlueNoise => self.blue_noise,
             Switch::LightTree => self.light_tree,
             Switch::SharedEyes => self.shared_eyes,
+            Switch::Ambient => self.ambient,
             Switch::SmoothMaximum => self.smooth_maximum,
         }
     }

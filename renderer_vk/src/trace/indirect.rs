@@ -33,6 +33,11 @@ pub fn is_adaptive(settings: &Settings) -> bool {
         && denoise::in_use(settings) == DenoiserChoice::ASvgf
 }
 
+/// Whether the last bounce adds light of further ones (`rt_bounceAmbient`).
+pub fn adds_ambient(settings: &Settings) -> bool {
+    settings.rt_bounce_ambient > 0.0
+}
+
 /// Bounces of a path that starts by a specular lobe: one more than `rt_bounces`, as for a path behind a mirror, so that the
 /// surface that its first ray hits has all bounces of a visible one. Live frames without rough `metal` save it: other
 /// surfaces reflect little.

@@ -15,6 +15,7 @@ use shaders::trace_types::constants as c;
 use support::Aabb;
 
 use super::cell_grid::CellGrid;
+use super::cell_light;
 use super::light_cells::Cells;
 use super::light_rows;
 use super::light_tables::luminance;
@@ -424,6 +425,10 @@ impl MapLights {
             nodes: buffers.add("trace nodes", &cells.nodes)?,
             leaf_cells: buffers.add("trace leafs", &cells.leaf_cells)?,
             grid: buffers.add("trace cell grid", &grid.starts)?,
+            cell_light: buffers.add(
+                "trace cell light",
+                &cell_light::of(source.bsp, &cells.cells),
+            )?,
             rows: buffers.add("trace light rows", &rows)?,
             slots: buffers.add("trace light lists", &slots)?,
             node_count: count(cells.nodes.len()),

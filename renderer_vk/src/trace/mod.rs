@@ -17,6 +17,7 @@ mod blue_noise;
 mod bodies;
 pub mod bvh;
 mod cell_grid;
+mod cell_light;
 pub mod counters;
 pub mod cutout;
 pub mod denoise;

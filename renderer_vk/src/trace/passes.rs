@@ -73,6 +73,8 @@ pub enum Switch {
     LightTree,
     /// The other eye's light of this frame is known (`rt_shareEyes`).
     SharedEyes,
+    /// The last bounce adds light of further ones.
+    Ambient,
     /// The maximum of the colour range of antialiasing is smoothed over time.
     SmoothMaximum,
 }
@@ -285,7 +287,7 @@ passes! {
     /// The same of the last bounce, after which no path goes on.
     BounceShadeLast = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
         constants: &[(ids::bounce::LAST_BOUNCE, 1)],
-        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive), (ids::lights::LIGHT_TREE, LightTree)],
+        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive), (ids::lights::LIGHT_TREE, LightTree), (ids::bounce_hits::AMBIENT, Switch::Ambient)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
         may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells, SelectedCells],
         writes: &[BounceLights, GlossSurfaces],

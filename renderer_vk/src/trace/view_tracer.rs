@@ -465,6 +465,7 @@ impl ViewTracer {
             roulette: settings.rt_bounce_roulette,
             light_tree: uses_tree(settings),
             shared_eyes: params.denoise.other_eye != 0,
+            ambient: indirect::adds_ambient(settings),
             smooth_maximum: antialias::smooths_maximum(settings),
         }
     }

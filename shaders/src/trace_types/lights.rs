@@ -206,6 +206,9 @@ pub struct LightView {
     pub tree: u64,
     /// The same over lights that move or change, in their present state.
     pub changing_tree: u64,
+    /// Mean light of each cell by the map's light grid, as radiance of a white diffuse surface (`Vec3`), and after it
+    /// their mean.
+    pub cell_light: u64,
     /// Number of nodes; 0: every point lies in no cluster.
     pub node_count: u32,
     /// Number of cells.

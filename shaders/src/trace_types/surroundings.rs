@@ -98,6 +98,10 @@ pub struct TransportView {
     pub roulette: u32,
     /// Part of `bounce_samples` that the corners of the picture need less than its centre.
     pub foveation: f32,
+    /// Part of the light of a cell that arrives at the last vertex of a path; 0: none.
+    pub ambient: f32,
+    /// Decrease of that light with the length of the last ray, per unit.
+    pub ambient_fall: f32,
 }
 
 /// The flares of a view.

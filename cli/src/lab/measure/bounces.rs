@@ -11,6 +11,9 @@ use crate::view::Camera;
 /// Bounces of the pictures that are compared.
 const FEW: [u32; 4] = [0, 1, 2, 4];
 
+/// Of these the ones that are compared with light of further bounces, too, if the settings add it.
+const COMPLETED: [u32; 3] = [1, 2, 4];
+
 /// Bounces of the reference.
 const ALL: u32 = 8;
 
@@ -24,8 +27,26 @@ const FLOOR: f64 = 0.01;
 const DARKEST: f64 = 0.1;
 
 /// Frames of a place.
-pub fn frames(reference: u32) -> u64 {
-    (FEW.len() as u64 + 1) * u64::from(reference)
+pub fn frames(base: &Settings, reference: u32) -> u64 {
+    (kinds(base).len() as u64 + 1) * u64::from(reference)
+}
+
+/// Names and settings of the pictures that are compared.
+fn kinds(base: &Settings) -> Vec<(String, Settings)> {
+    let with = |rt_bounces, rt_bounce_ambient| Settings {
+        rt_bounces,
+        rt_bounce_ambient,
+        ..base.clone()
+    };
+    let few = FEW.map(|bounces| (bounces.to_string(), with(bounces, 0.0)));
+    let completed = COMPLETED.map(|bounces| {
+        let name = format!("{bounces}+ambient");
+        (name, with(bounces, base.rt_bounce_ambient))
+    });
+    let adds = base.rt_bounce_ambient > 0.0;
+    few.into_iter()
+        .chain(completed.into_iter().filter(|_| adds))
+        .collect()
 }
 
 /// For each number of bounces the error of its mean of `frames` frames against that of [`ALL`] bounces. All use the same
@@ -40,25 +61,25 @@ pub fn place(
     frames: u32,
     bar: &ProgressBar,
 ) -> Result<Map<String, Value>> {
-    let mut light = |bounces| {
-        let settings = Settings {
-            rt_bounces: bounces,
-            ..base.clone()
-        };
-        let (_, light) = stage.reference(&settings, camera, &[], frames, bar)?;
+    let mut light = |settings: &Settings| {
+        let (_, light) = stage.reference(settings, camera, &[], frames, bar)?;
         anyhow::Ok(light)
     };
-    let all = light(ALL)?;
+    let all = light(&Settings {
+        rt_bounces: ALL,
+        rt_bounce_ambient: 0.0,
+        ..base.clone()
+    })?;
     let mut results = Map::new();
-    for bounces in FEW {
-        let figures = Missing::of(&light(bounces)?, &all);
+    for (name, settings) in kinds(base) {
+        let figures = Missing::of(&light(&settings)?, &all);
         let figures = json!({
             "relative_rmse": figures.relative_rmse,
             "mean": figures.mean,
             "darkest": figures.darkest,
             "too_bright": figures.too_bright,
         });
-        results.insert(bounces.to_string(), figures);
+        results.insert(name, figures);
     }
     Ok(results)
 }
@@ -120,12 +141,12 @@ const COLUMNS: [(&str, &str); 4] = [
 
 /// Prints a row for each place and number of bounces.
 pub fn print(all: &Map<String, Value>) {
-    print!("{:<20} {:<8}", "place", "bounces");
+    print!("{:<20} {:<10}", "place", "bounces");
     COLUMNS.iter().for_each(|(name, _)| print!(" {name:>14}"));
     println!();
     for (place, kinds) in all {
         for (bounces, figures) in kinds.as_object().into_iter().flatten() {
-            print!("{place:<20} {bounces:<8}");
+            print!("{place:<20} {bounces:<10}");
             for (_, name) in COLUMNS {
                 let figure = figures.get(name).and_then(Value::as_f64);
                 print!(" {:>14.4}", figure.unwrap_or(f64::NAN));

@@ -1,6 +1,7 @@
 //! The traced look compared with closed forms, on any Vulkan device (Mesa's lavapipe in continuous integration).
 //! Without one the tests are skipped; with `RELIGHT_REQUIRE_GPU=1` they fail.
 
+mod ambient;
 mod antialias_variants;
 mod antialiasing;
 mod blooming;

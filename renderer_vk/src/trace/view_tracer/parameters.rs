@@ -160,6 +160,8 @@ impl ViewTracer {
             bounce_samples: self.bounce_samples(view, settings),
             foveation: settings.rt_foveation,
             roulette: u32::from(settings.rt_bounce_roulette),
+            ambient: settings.rt_bounce_ambient,
+            ambient_fall: settings.rt_bounce_ambient_fall,
             filters: geometry.map_or(0, |g| g.surroundings.filters()),
             filter_count: geometry.map_or(0, |g| g.surroundings.filter_count()),
             layers,
