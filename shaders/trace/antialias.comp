@@ -11,12 +11,12 @@
 //
 // Colours are blended in a compressed range, so that a bright sample does not outweigh all others at an edge, and
 // clipped in YCoCg.
-#include "trace/denoise.glsl"
-#include "trace/exposure.glsl"
-#include "trace/motion.glsl"
+#include "trace/resolve.glsl"
 
 // 1: the greatest luminance of the colour range is smoothed over time. 0 removes the code.
 layout(constant_id = 15) const uint SMOOTH_MAXIMUM = 0;
+// 1: pixels without history have more samples. 0 removes the code.
+layout(constant_id = 16) const uint MORE_SAMPLES = 0;
 
 const int GROUP = 16;
 // Traced pixels that a work group may read along one axis: one for each of its pixels, and one more on each side.
@@ -43,24 +43,12 @@ const float REST_FRAMES = 16.0, MOVING_FRAMES = 2.0, COARSE_MOVING_FRAMES = 5.0;
 const float BENT_FRAMES = 0.5;
 // Clipping range of the history, standard deviations, at rest and in motion.
 const float REST_RANGE = 1.25, MOVING_RANGE = 1.0;
-// A neighbour is in front if its view distance is below this fraction of the pixel's.
-const float IN_FRONT = 0.9;
-// Relative tolerance of view distances of the same surface.
-const float SAME_DISTANCE = 0.04;
 // Least relative change of the light within a frame that corrects the history.
 const float LEAST_CHANGE = 1.0e-3;
 // Spacing of the pixels from which the change of the light around a pixel is taken, pixels.
 const int CHANGE_SPACING = 2;
 // Largest factor by which a change of the light scales the history, up or down.
 const float MOST_RATIO = 8.0;
-
-// Nearly linear up to white, so that edges converge to the mean of both sides; bounded by four times white.
-vec3 compress(vec3 c, float exposure) { return c / (1.0 + max_component(c) * exposure); }
-vec3 expand(vec3 c, float exposure) { return c / max(1.0 - max_component(c) * exposure, 1.0e-3); }
-const float COMPRESSION = 0.25;
-
-vec3 to_ycocg(vec3 c) { return vec3(0.25 * c.r + 0.5 * c.g + 0.25 * c.b, 0.5 * (c.r - c.b), 0.5 * c.g - 0.25 * (c.r + c.b)); }
-vec3 from_ycocg(vec3 c) { return vec3(c.x + c.y - c.z, c.x + c.z, c.x - c.y - c.z); }
 
 vec4 last_resolved(vec2 uv) {
     return textureLod(sampler2D(textures[VIEW.antialias.last_resolved], samplers[VIEW.antialias.sampler_index]), uv, 0.0);
@@ -91,27 +79,6 @@ vec4 last_bicubic(vec2 place, vec2 size) {
 float quadratic(float x) {
     x = abs(x);
     return x < 0.5 ? 1.0 - 2.0 * x * x : x < 1.5 ? (x - 2.5) * x + 1.5 : 0.0;
-}
-
-// Whether the traced pixel at `place`, or the range of the pixels around it, had this view distance in the last frame.
-// A range, because a floor at a grazing angle has many distances. The pixels around count, because the samples of an
-// edge pixel hit one side in one frame and the other side in the next. In the checkerboard of reflection and refraction
-// (`takes_turns`) diagonal and direct neighbours show different surfaces, and either may match. At rest, a surface too
-// thin to be hit in every frame counts as seen unless something around it has moved away since.
-bool was_seen(vec2 place, float view_distance, bool rests, bool takes_turns) {
-    const vec2 around[8] = vec2[](vec2(1, 1), vec2(-1, 1), vec2(1, -1), vec2(-1, -1), vec2(1, 0), vec2(-1, 0), vec2(0, 1), vec2(0, -1));
-    ivec2 last = ivec2(VIEW.width, VIEW.height) - 1;
-    float slack = SAME_DISTANCE * view_distance + 1.0;
-    if (abs(abs(last_view_distance_read(clamp(ivec2(floor(place)), ivec2(0), last))) - view_distance) < slack) return true;
-    float least = 1.0e30, most = 0.0;
-    bool rested = rests;
-    for (int i = 0; i < (rests || takes_turns ? 8 : 4); i++) {
-        float then = last_view_distance_read(clamp(ivec2(floor(place + 0.99 * around[i])), ivec2(0), last));
-        rested = rested && then >= 0.0;
-        least = min(least, abs(then));
-        most = max(most, abs(then));
-    }
-    return rested || view_distance > least - slack && view_distance < most + slack;
 }
 
 // Scales the history of a resting pixel by the change of the light since the last frame. Repeated each frame, this
@@ -152,7 +119,7 @@ void main() {
     ivec2 output_size = ivec2(VIEW.antialias.output_width, VIEW.antialias.output_height);
     ivec2 traced_size = ivec2(VIEW.width, VIEW.height);
     vec2 ratio = vec2(traced_size) / vec2(output_size);
-    float exposure = COMPRESSION * max(ExposureState(VIEW.exposure.state).exposure, 1.0e-3) * exp2(VIEW.exposure.base + VIEW.exposure.bias);
+    float exposure = compression();
 
     ivec2 first = ivec2(floor((vec2(gl_WorkGroupID.xy) * float(GROUP) + 0.5) * ratio)) - 1;
     for (int i = int(gl_LocalInvocationIndex); i < TILE * TILE; i += GROUP * GROUP) {
@@ -237,6 +204,13 @@ void main() {
     } else if (frames > 0.0) {
         confidence = mix(min(narrow.w, 1.0), 1.0, fresh);
         if (narrow.w > 1.0e-3) now = mix(narrow.rgb / narrow.w, now, fresh);
+    }
+    if (MORE_SAMPLES != 0 && frames == 0.0) {
+        vec4 more = imageLoad(images_rgba16f[VIEW.antialias.more_samples], middle);
+        if (more.a > 0.0) {
+            now = more.rgb;
+            confidence = more.a;
+        }
     }
     if (SMOOTH_MAXIMUM != 0) {
         // an edge in motion may be at another texel than the last maximum; ripples under a camera at rest have no offset

@@ -13,6 +13,13 @@ struct CameraRay {
     vec2 seen;           // place in the picture, traced pixels from the left and top
 };
 
+// Direction of the ray through a place of the picture and the centre of the lens, of depth 1.
+vec3 camera_direction(vec2 seen) {
+    vec2 ndc = seen / vec2(VIEW.width, VIEW.height) * 2.0 - 1.0;
+    ndc.x += VIEW.camera.stereo_shift;
+    return VIEW.camera.forward - VIEW.camera.left * ndc.x - VIEW.camera.up * ndc.y;
+}
+
 // A thin lens (Kolb et al., A Realistic Camera Model for Computer Graphics, SIGGRAPH 1995, section 2, and Cook et al.,
 // Distributed Ray Tracing, SIGGRAPH 1984): rays from all of a disc meet in the plane of focus; the disc is sampled
 // uniformly by area.
@@ -21,10 +28,7 @@ CameraRay camera_ray(ivec2 pixel) {
     // one random number for each axis of the pixel's square
     vec2 place = (VIEW.flags & VIEW_JITTER) != 0 ? rng_next2() : vec2(0.5) + VIEW.antialias.jitter;
     ray.seen = vec2(pixel) + place;
-    vec2 ndc = ray.seen / vec2(VIEW.width, VIEW.height) * 2.0 - 1.0;
-    ndc.x += VIEW.camera.stereo_shift;
-    // scaled to depth 1
-    vec3 direction = VIEW.camera.forward - VIEW.camera.left * ndc.x - VIEW.camera.up * ndc.y;
+    vec3 direction = camera_direction(ray.seen);
     ray.through_middle = normalize(direction);
     ray.origin = VIEW.camera.origin;
     ray.direction = ray.through_middle;

@@ -19,6 +19,7 @@ const COMPARED: &[&str] = &[
     "rt_bounceAmbient",
     "rt_bounceAmbientFall",
     "rt_lightSelection",
+    "rt_taaRays",
     "rt_taaMaximum",
 ];
 

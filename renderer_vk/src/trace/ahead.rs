@@ -9,7 +9,7 @@ use crate::settings::{Anaglyph, DenoiserChoice, Settings};
 
 /// Passes that the settings decide about, or that every frame runs, the slowest to compile first. Others are
 /// compiled when a frame first runs them.
-const AHEAD: [Pass; 41] = [
+const AHEAD: [Pass; 42] = [
     Pass::Primary,
     Pass::BounceShadeLast,
     Pass::BounceShade,
@@ -51,6 +51,7 @@ const AHEAD: [Pass; 41] = [
     Pass::ScreenMarch,
     Pass::ScreenLight,
     Pass::BounceSelect,
+    Pass::MoreSamples,
 ];
 /// Passes that only maps with fog run.
 const FOG_AHEAD: [Pass; 2] = [Pass::FogLight, Pass::FogFilter];
@@ -91,6 +92,7 @@ fn is_chosen(pass: Pass, settings: &Settings, needs: MapNeeds) -> bool {
             denoise::in_use(settings) == DenoiserChoice::Sparse
         }
         Pass::BloomDown | Pass::BloomUp => settings.rt_bloom > 0.0,
+        Pass::MoreSamples => antialias::traces_more(settings),
         Pass::Antialias => antialias::is_temporal(settings),
         _ => true,
     }
@@ -138,6 +140,7 @@ fn states(pass: Pass, settings: &Settings, needs: MapNeeds) -> Vec<usize> {
             Switch::LightTree => light_selection::uses_tree(settings),
             Switch::SharedEyes => settings.rt_share_eyes && settings.anaglyph != Anaglyph::None,
             Switch::Ambient => indirect::adds_ambient(settings),
+            Switch::MoreSamples => antialias::traces_more(settings),
             Switch::SmoothMaximum => antialias::smooths_maximum(settings),
         };
         if !on {

@@ -54,6 +54,12 @@ pub fn smooths_maximum(settings: &Settings) -> bool {
     is_temporal(settings) && settings.rt_taa_maximum > 0.0
 }
 
+/// Whether pixels without history are sampled again with these settings (`rt_taaRays`). Not with a lens, through which a
+/// pixel shows several surfaces.
+pub fn traces_more(settings: &Settings) -> bool {
+    is_temporal(settings) && settings.rt_taa_rays > 0 && !settings.rt_dof
+}
+
 /// Traced size for a picture of the size `output`, pixels. Reference pictures are traced in full size.
 pub fn traced_size(settings: &Settings, output: [u32; 2]) -> [u32; 2] {
     if settings.rt_accumulate || settings.rt_scale.is_nan() || settings.rt_scale >= 1.0 {
@@ -103,6 +109,8 @@ pub struct Antialias {
     resolved: Option<[Resolved; 2]>,
     /// Greatest luminance of the colour range in this frame and the last, `R16F`, while it is smoothed.
     maxima: Option<[Image; 2]>,
+    /// `Rgba16F` of the traced size: more samples of pixels without history, while they are traced.
+    pub(super) more_samples: Option<Image>,
     /// The last frame left a valid resolved picture, and the maxima if there are any.
     history: bool,
     frame: u32,
@@ -127,6 +135,7 @@ impl Antialias {
             })?,
             resolved: None,
             maxima: None,
+            more_samples: None,
             history: false,
             frame: 0,
             method: Method::Plain,
@@ -171,6 +180,8 @@ impl Antialias {
             self.history = false;
         }
         self.fit_maxima(device, smooths_maximum(settings), output)?;
+        let traced = [targets.width, targets.height];
+        self.fit_more_samples(device, traces_more(settings), traced)?;
         self.history &= history && method == self.method;
         self.method = method;
         let jittered = method == Method::Temporal && settings.rt_antialiasing;
@@ -209,6 +220,8 @@ impl Antialias {
             maximum,
             last_maximum,
             maximum_kept: settings.rt_taa_maximum,
+            more_samples: (self.more_samples.as_ref()).map_or(0, Image::storage_index),
+            more_rays: settings.rt_taa_rays,
             padding: 0,
         })
     }
@@ -228,6 +241,22 @@ impl Antialias {
         Ok(())
     }
 
+    /// Makes or drops the image of more samples.
+    fn fit_more_samples(
+        &mut self,
+        device: &Device,
+        needed: bool,
+        [width, height]: [u32; 2],
+    ) -> Result<(), Error> {
+        (self.more_samples).take_if(|m| !needed || [m.width(), m.height()] != [width, height]);
+        if needed && self.more_samples.is_none() {
+            let (name, format) = ("trace more samples", Format::Rgba16F);
+            let desc = ImageDesc::new(name, width, height, format, ImageUsage::STORAGE);
+            self.more_samples = Some(Image::new(device, &desc)?);
+        }
+        Ok(())
+    }
+
     /// An image as `Targets::other`, which nothing else uses before the picture is resolved; `None` if the traced
     /// picture is shown unchanged.
     pub fn other(&self) -> Option<&Image> {
@@ -241,7 +270,12 @@ impl Antialias {
     pub fn record(&self, passes: &mut FramePasses<'_>) -> Result<(), Error> {
         match self.method {
             Method::Plain => return Ok(()),
-            Method::Temporal => passes.run(Pass::Antialias)?,
+            Method::Temporal => {
+                if self.more_samples.is_some() {
+                    passes.run(Pass::MoreSamples)?;
+                }
+                passes.run(Pass::Antialias)?;
+            }
             Method::Upscale => passes.run(Pass::Upscale)?,
         }
         if self.sharpens {

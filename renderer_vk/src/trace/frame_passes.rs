@@ -46,6 +46,8 @@ pub struct FrameFacts {
     pub shared_eyes: bool,
     /// The last bounce adds light of further ones.
     pub ambient: bool,
+    /// Pixels without history have more samples.
+    pub more_samples: bool,
     /// The maximum of the colour range of antialiasing is smoothed over time.
     pub smooth_maximum: bool,
 }
@@ -66,6 +68,7 @@ impl FrameFacts {
             Switch::LightTree => self.light_tree,
             Switch::SharedEyes => self.shared_eyes,
             Switch::Ambient => self.ambient,
+            Switch::MoreSamples => self.more_samples,
             Switch::SmoothMaximum => self.smooth_maximum,
         }
     }

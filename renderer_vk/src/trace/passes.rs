@@ -77,6 +77,8 @@ pub enum Switch {
     Ambient,
     /// The maximum of the colour range of antialiasing is smoothed over time.
     SmoothMaximum,
+    /// Pixels without history have more samples.
+    MoreSamples,
 }
 
 /// Declaration of a pass.
@@ -405,11 +407,19 @@ passes! {
         may_read: &[IndirectLight],
         writes: &[ScreenLight],
     }
+    /// More samples of the pixels that have no history (`rt_taaRays`).
+    MoreSamples = "trace_more_samples", Rays(&shaders::TRACE_MORE_SAMPLES), Traced {
+        switches: &[(ids::specular::HAS_GLOSS, Gloss)],
+        reads: &[Scene, GBuffer, DirectLight, Picture],
+        may_read: &[IndirectLight],
+        writes: &[MoreSamples],
+        counter: Some(t::COUNT_MORE_SAMPLES),
+    }
     /// Temporal antialiasing, and upscaling with it.
     Antialias = "trace_antialias", Compute(&shaders::TRACE_ANTIALIAS_COMP), Output {
-        switches: &[(ids::antialias::SMOOTH_MAXIMUM, Switch::SmoothMaximum)],
+        switches: &[(ids::antialias::SMOOTH_MAXIMUM, Switch::SmoothMaximum), (ids::antialias::MORE_SAMPLES, Switch::MoreSamples)],
         reads: &[GBuffer, Shown, DirectLight, Picture],
-        may_read: &[IndirectLight, Gradients],
+        may_read: &[IndirectLight, Gradients, MoreSamples],
         writes: &[ResolvedPicture],
     }
     /// Upscaling of a single frame.
@@ -481,7 +491,7 @@ impl Pass {
 }
 
 /// Number of ray counters.
-pub const COUNTERS: usize = t::COUNT_PHOTONS as usize + 1;
+pub const COUNTERS: usize = t::COUNT_MORE_SAMPLES as usize + 1;
 
 /// Number of the ray counter of the pass with this name.
 pub fn counter_of(name: &str) -> Option<usize> {

@@ -77,6 +77,8 @@ pub enum Resource {
     LightHistory,
     /// Radiance of the traced size.
     Picture,
+    /// More samples of the pixels that have no history.
+    MoreSamples,
     /// Radiance of the output's size, resolved over frames or upscaled.
     ResolvedPicture,
     /// Histogram of luminance.

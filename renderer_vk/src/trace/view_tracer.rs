@@ -76,7 +76,7 @@ pub struct ViewTracer {
     passes: Arc<PassSet>,
     fog: LitFog,
     pub(super) denoiser: Denoiser,
-    antialias: Antialias,
+    pub(super) antialias: Antialias,
     motion: Motion,
     bloom: Bloom,
     blue_noise: BlueNoise,
@@ -426,10 +426,10 @@ impl ViewTracer {
         indirect::filter_specular(passes)?;
         // after the denoiser, which is the last to read the positions that the filtered light overwrites
         self.fog.record(passes, &targets.fog)?;
-        self.counters.end(passes.rec)?;
         passes.run(Pass::Composite)?;
         self.screen.keep_light(passes)?;
         self.antialias.record(passes)?;
+        self.counters.end(passes.rec)?;
         passes.run(Pass::Histogram)?;
         passes.run(Pass::Exposure)?;
         self.bloom.record(passes)?;
@@ -466,6 +466,7 @@ impl ViewTracer {
             light_tree: uses_tree(settings),
             shared_eyes: params.denoise.other_eye != 0,
             ambient: indirect::adds_ambient(settings),
+            more_samples: antialias::traces_more(settings),
             smooth_maximum: antialias::smooths_maximum(settings),
         }
     }

@@ -121,6 +121,7 @@ pub const COUNT_SUNS: u32 = 5;
 pub const COUNT_MIRRORS: u32 = 6;
 pub const COUNT_SPECULAR: u32 = 7;
 pub const COUNT_PHOTONS: u32 = 8;
+pub const COUNT_MORE_SAMPLES: u32 = 9;
 
 /// Counters of each counted pass, to reduce contention.
 pub const COUNTER_ROWS: u32 = 64;

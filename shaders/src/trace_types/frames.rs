@@ -137,6 +137,11 @@ pub struct AntialiasView {
     pub last_maximum: u32,
     /// Weight of `last_maximum`.
     pub maximum_kept: f32,
+    /// RGBA16F of the traced size: mean of more samples of pixels without history (compressed YCoCg), and their
+    /// number; 0: none.
+    pub more_samples: u32,
+    /// Rays for each of them, besides the pixel's own.
+    pub more_rays: u32,
     /// To a multiple of eight bytes.
     pub padding: u32,
 }

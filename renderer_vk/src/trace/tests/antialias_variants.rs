@@ -1,17 +1,22 @@
-//! Variants of temporal antialiasing: smoothed maximum of its colour range.
+//! Variants of temporal antialiasing: smoothed maximum of its colour range, more samples where the history is lost.
 
 use glam::Vec3;
+use shaders::trace_types::constants::COUNT_MORE_SAMPLES;
 
 use super::antialiasing::{checkerboard, live, rippled, walk};
-use super::harness::{Gpu, Scene, gpu_tests, rectangle, reference, switch_dlight};
+use super::harness::{Gpu, Scene, gpu_tests, identity, rectangle, reference, stage, switch_dlight};
 use crate::scene::TracedScene;
 use crate::settings::{DenoiserChoice, Settings};
 
 gpu_tests! {
+    any: [
+        lost_pixels_get_more_samples,
+    ],
     compute: [
         a_smooth_maximum_calms_ripples,
         a_smooth_maximum_keeps_what_rests,
         a_smooth_maximum_lets_light_go_out,
+        lit_pixels_get_more_samples,
     ],
 }
 
@@ -165,5 +170,99 @@ fn a_smooth_maximum_lets_light_go_out(gpu: &mut Gpu) {
                 "{frame}: {left}"
             );
         }
+    }
+}
+
+/// Rays for a pixel without history.
+const RAYS: [u32; 5] = [0, 1, 2, 4, 8];
+
+/// Frames before each picture that is looked at.
+const MOVED: [u32; 4] = [8, 10, 12, 14];
+
+/// Root mean square error of the pixels that the last frame samples again, for each of [`RAYS`], then the light of these
+/// pixels over that of the reference, and their part of all.
+fn of_lost_pixels(
+    gpu: &mut Gpu,
+    scene: &Scene,
+    place: impl Fn(u32, &mut TracedScene),
+    light: DenoiserChoice,
+) -> ([f32; 5], [f32; 5], f32) {
+    let mut seen = [const { Vec::new() }; 5];
+    let (mut truth, mut pixels) = (Vec::new(), 0);
+    for moved in MOVED {
+        let (exact, _) = gpu.render_views(scene, &reference(), 256, |_, view| place(moved, view));
+        let pictures = RAYS.map(|rt_taa_rays| {
+            let settings = Settings {
+                rt_taa_rays,
+                rt_denoiser: light,
+                ..live()
+            };
+            gpu.count_rays(rt_taa_rays > 0);
+            let (picture, _) = gpu.render_views(scene, &settings, moved + 1, &place);
+            picture
+        });
+        let rays = gpu.rays().expect("counted")[COUNT_MORE_SAMPLES as usize];
+        assert!(rays > 0);
+        gpu.count_rays(false);
+        let samples = gpu.look.antialias.more_samples.as_ref().expect("traced");
+        let samples = gpu.device.read_image(samples).expect("read");
+        let samples: Vec<[u16; 4]> = bytemuck::pod_collect_to_vec(&samples);
+        let of = |picture: Vec<Vec3>| {
+            let pixels = picture.into_iter().zip(&samples);
+            pixels.filter(|(_, s)| s[3] != 0).map(|(p, _)| p)
+        };
+        truth.extend(of(exact));
+        for (seen, picture) in seen.iter_mut().zip(pictures) {
+            seen.extend(of(picture));
+        }
+        pixels += samples.len();
+    }
+    let errors = seen.each_ref().map(|s| squares(s, &truth).sqrt());
+    let means = seen.each_ref().map(|s| mean(s) / mean(&truth));
+    let part = truth.len() as f32 / pixels as f32;
+    println!("{light:?}: error {errors:?}, light {means:?}; {part} of all pixels");
+    (errors, means, part)
+}
+
+/// A thing before a floor of squares moves aside.
+fn lost_pixels_get_more_samples(gpu: &mut Gpu) {
+    let mut scene = checkerboard();
+    let red = scene.material(&[stage::constant([0.9, 0.1, 0.1])], 0);
+    let shape = rectangle(Vec3::ZERO, Vec3::Z * 40.0, Vec3::Y * 60.0);
+    scene.mesh(shape, red, identity());
+    let place = |frame: u32, view: &mut TracedScene| {
+        let at = Vec3::new(-60.0, 60.0 - 7.0 * frame as f32, 10.0);
+        view.time = frame as f32 * 0.02;
+        view.instances.last_mut().expect("placed").origin = at;
+        view.look.entities[0].origin = at;
+    };
+    let (errors, means, part) = of_lost_pixels(gpu, &scene, place, DenoiserChoice::None);
+    assert!(part > 0.002 && part < 0.1, "{part}");
+    assert!(errors[4] < 0.7 * errors[0], "{errors:?}");
+    assert!((means[4] - 1.0).abs() < 0.05, "{means:?}");
+}
+
+/// The same in a lit hall, whose light comes from the pixels around.
+fn lit_pixels_get_more_samples(gpu: &mut Gpu) {
+    for light in DENOISERS {
+        let mut scene = Scene::hall(40.0, 0.6, 64);
+        scene.point(Vec3::new(-100.0, -100.0, 0.0), 6000.0, 4.0);
+        let dark = scene.diffuse(0.1);
+        for i in 0..8 {
+            let corner = Vec3::new(-150.0 + 36.0 * i as f32, -140.0, -79.5);
+            scene.quad(rectangle(corner, Vec3::X * 18.0, Vec3::Y * 280.0), dark);
+        }
+        let grey = scene.diffuse(0.3);
+        let shape = rectangle(Vec3::ZERO, Vec3::Z * 60.0, Vec3::Y * 60.0);
+        scene.mesh(shape, grey, identity());
+        let place = |frame: u32, view: &mut TracedScene| {
+            let at = Vec3::new(-60.0, 60.0 - 7.0 * frame as f32, -60.0);
+            view.time = frame as f32 * 0.02;
+            view.instances.last_mut().expect("placed").origin = at;
+            view.look.entities[0].origin = at;
+        };
+        let (errors, means, _) = of_lost_pixels(gpu, &scene, place, light);
+        assert!(errors[4] < 0.95 * errors[0], "{errors:?}");
+        assert!((means[4] - 1.0).abs() < 0.05, "{means:?}");
     }
 }

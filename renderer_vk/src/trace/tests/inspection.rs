@@ -52,11 +52,11 @@ fn rays_are_counted_exactly_and_only_when_asked(gpu: &mut Gpu) {
     let rays = gpu.rays().expect("counted");
     let pixels = u64::from(SIZE * SIZE);
     // for each pixel one ray to the floor and one to the light; no rays for layers, because there are none
-    assert_eq!(rays, [pixels, 0, pixels, 0, 0, 0, 0, 0, 0]);
+    assert_eq!(rays, [pixels, 0, pixels, 0, 0, 0, 0, 0, 0, 0]);
     gpu.render(&scene, &settings(1), 4);
     // the floor faces empty space
     let rays = gpu.rays().expect("counted");
-    assert_eq!(rays, [pixels, 0, pixels, pixels, 0, 0, 0, 0, 0]);
+    assert_eq!(rays, [pixels, 0, pixels, pixels, 0, 0, 0, 0, 0, 0]);
     // one of 2 x 2 pixels in a denoised picture, a quarter of the rays
     let denoised = Settings {
         rt_accumulate: false,
@@ -65,7 +65,7 @@ fn rays_are_counted_exactly_and_only_when_asked(gpu: &mut Gpu) {
     };
     gpu.render(&scene, &denoised, 4);
     let rays = gpu.rays().expect("counted");
-    assert_eq!(rays, [pixels, 0, pixels, pixels / 4, 0, 0, 0, 0, 0]);
+    assert_eq!(rays, [pixels, 0, pixels, pixels / 4, 0, 0, 0, 0, 0, 0]);
     // three paths in place of one
     let thrice = Settings {
         rt_samples: 3,
@@ -73,7 +73,7 @@ fn rays_are_counted_exactly_and_only_when_asked(gpu: &mut Gpu) {
     };
     gpu.render(&scene, &thrice, 4);
     let rays = gpu.rays().expect("counted");
-    assert_eq!(rays, [pixels, 0, pixels, 3 * pixels / 4, 0, 0, 0, 0, 0]);
+    assert_eq!(rays, [pixels, 0, pixels, 3 * pixels / 4, 0, 0, 0, 0, 0, 0]);
     // rays to the sampled light of each pixel, and to a sun
     let mut sunny = lit_floor();
     sunny.sun(Vec3::Z, 1.0, 0.01);
@@ -84,7 +84,7 @@ fn rays_are_counted_exactly_and_only_when_asked(gpu: &mut Gpu) {
     };
     gpu.render(&sunny, &chosen, 4);
     let rays = gpu.rays().expect("counted");
-    assert_eq!(rays, [pixels, 0, pixels, 0, 0, pixels, 0, 0, 0]);
+    assert_eq!(rays, [pixels, 0, pixels, 0, 0, pixels, 0, 0, 0, 0]);
     gpu.count_rays(false);
     gpu.render(&scene, &settings(0), 1);
     assert_eq!(gpu.rays(), None);
