@@ -38,9 +38,11 @@ pub use renderer::{
     CpuTimes, FRAMES_IN_FLIGHT, FrameStats, Renderer, RendererOptions, map_options, probe,
 };
 pub use settings::{
-    Anaglyph, DebugOutput, DenoiserChoice, HdrChoice, LightSelection, Look, MapLightChoice,
-    ModelShadows, Settings, TextureMode, TracerChoice,
+    Anaglyph, DebugOutput, DenoiserChoice, HdrChoice, HitFeedback, LightSelection, Look,
+    MapLightChoice, ModelShadows, Settings, TextureMode, TracerChoice,
 };
-pub use statistics::{Costs, Latency, LightCost, MemoryPurpose, PassCost, Spread, StructureCost};
+pub use statistics::{
+    Costs, Latency, LightCost, MemoryPurpose, MovingCost, PassCost, Spread, StructureCost,
+};
 pub use stereo::Eye;
 pub use world::LightsChanged;

@@ -123,6 +123,58 @@ pub struct LightCost {
     pub tree_bytes: Option<u64>,
 }
 
+/// Cost of the structures of what moves in traced views, summed over frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct MovingCost {
+    /// Frames.
+    pub frames: u64,
+    /// Work of the CPU for structures, milliseconds.
+    pub cpu_ms: f64,
+    /// Animated parts with a structure.
+    pub parts: u64,
+    /// Animated parts that were left out.
+    pub left_out_parts: u64,
+    /// Refits and builds of their structures.
+    pub refits: u64,
+    /// Animated parts whose hits were counted (`rt_hitFeedback`).
+    pub counted: u64,
+    /// Those that no ray hit.
+    pub unmet: u64,
+    /// Bodies, while hits are counted: instances of entities with triangles.
+    pub bodies: u64,
+    /// Those that were left out.
+    pub left_out: u64,
+}
+
+impl MovingCost {
+    /// With the counts of `feedback`, which has no others.
+    pub(crate) fn with_feedback(self, feedback: Self) -> Self {
+        Self {
+            frames: self.frames,
+            cpu_ms: self.cpu_ms,
+            parts: self.parts,
+            left_out_parts: self.left_out_parts,
+            refits: self.refits,
+            ..feedback
+        }
+    }
+
+    fn line(&self) -> String {
+        let parts = self.parts + self.left_out_parts;
+        #[allow(clippy::cast_precision_loss)] // rounded shares for reports
+        let percent = |part: u64, of: u64| part as f64 / of.max(1) as f64 * 100.0;
+        format!(
+            "{parts} animated parts in {} frames: {:.1} % met by no ray, {:.1} % refitted, {:.1} % left out; {:.1} % of {} bodies left out",
+            self.frames,
+            percent(self.unmet, self.counted),
+            percent(self.refits, parts),
+            percent(self.left_out_parts, parts),
+            percent(self.left_out, self.bodies),
+            self.bodies
+        )
+    }
+}
+
 /// How names of passes of a traced view begin.
 const TRACED: &str = "trace_";
 
@@ -143,6 +195,8 @@ pub struct Costs {
     pub reserved: u64,
     /// From input to picture, in a window.
     pub latency: Option<Latency>,
+    /// Structures of what moves, if hits are counted.
+    pub moving: Option<MovingCost>,
 }
 
 /// Times from input to picture of the newest frames, milliseconds. The engine reads input after a frame's end and
@@ -235,6 +289,7 @@ impl Costs {
             megabytes(self.reserved)
         ));
         lines.extend(self.latency.iter().map(Latency::line));
+        lines.extend(self.moving.iter().map(MovingCost::line));
         lines
     }
 
@@ -259,6 +314,9 @@ impl Costs {
         }
         let held = self.memory.iter().map(|(_, bytes)| bytes).sum();
         let _ = write!(line, "; {:.0} MB", megabytes(held));
+        if let Some(moving) = &self.moving {
+            let _ = write!(line, "; {}", moving.line());
+        }
         if let Some(latency) = &self.latency {
             let (to, from) = (latency.to, latency.from_end);
             let _ = write!(
@@ -281,6 +339,7 @@ impl Costs {
             total: PassReport::of(&self.total()),
             memory: self,
             latency: self.latency,
+            moving: self.moving,
         };
         // No value in a report fails to serialize.
         serde_json::to_string_pretty(&report).unwrap_or_default() + "\n"
@@ -299,6 +358,7 @@ struct Report<'a> {
     #[serde(serialize_with = "memory_by_name")]
     memory: &'a Costs,
     latency: Option<Latency>,
+    moving: Option<MovingCost>,
 }
 
 /// [`PassCost`] as JSON; a number that is not finite becomes `null`.
@@ -361,6 +421,7 @@ mod tests {
             ]),
             reserved: 1 << 20,
             latency: None,
+            moving: None,
         }
     }
 

@@ -4,6 +4,7 @@
 //! addresses.
 
 pub mod constants;
+mod feedback;
 mod frames;
 mod lights;
 mod photons;
@@ -15,6 +16,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::types::MaterialBuffers;
 
+pub use feedback::FeedbackView;
 pub use frames::{AntialiasView, DenoiseView, LastInstance, MotionView, ScreenView};
 pub use lights::{
     BspNode, DynamicRow, EmittedLight, LightBounds, LightRow, LightSlot, LightTreeNode, LightView,
@@ -50,6 +52,8 @@ pub struct TraceView {
     pub reservoirs: ReservoirView,
     /// Motion of surfaces.
     pub motion: MotionView,
+    /// Counts of rays that meet bodies.
+    pub feedback: FeedbackView,
     /// The denoiser's images.
     pub denoise: DenoiseView,
     /// Flares.

@@ -7,6 +7,7 @@
 
 #include "trace/candidate.glsl"
 #include "trace/count.glsl"
+#include "trace/feedback.glsl"
 
 #if defined(TRACER_COMPUTE) || defined(TRACER_QUERY) || defined(TRACER_NONE)
 
@@ -44,6 +45,8 @@ Hit follow_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, b
     // the miss shader reports NO_HIT; without a report the ray is blocked
     payload.geometry = any_hit ? 0 : NO_HIT;
     uint flags = any_hit ? gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT : gl_RayFlagsNoneEXT;
+    // the hit shader names what is counted
+    if (HIT_FEEDBACK != 0) flags &= ~gl_RayFlagsSkipClosestHitShaderEXT;
     traceRayEXT(scenes[VIEW.scene.top_level], flags, mask, 0, 0, 0, origin, tmin, direction, tmax, 0);
     return payload_hit();
 }
@@ -67,6 +70,8 @@ Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bo
     uint start = clock_now();
     Hit hit = follow_ray(origin, tmin, direction, tmax, mask, any_hit);
     ray_ticks += clock_now() - start;
+    count_hit(hit.geometry);
+    count_boxes(LAUNCH_PIXEL, origin, direction, hit.geometry == NO_HIT ? tmax : hit.t);
     return hit;
 }
 
@@ -77,6 +82,11 @@ void trace_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder
     uint start = clock_now();
     follow_layers(origin, direction, tmax, mask, order, found);
     ray_ticks += clock_now() - start;
+    for (uint i = 0; i < LAYERS_A_RAY; i++) {
+        if (found.keys[i] < LAYER_NONE) count_hit(found.hits[i].geometry);
+    }
+    // a body is found by a ray for layers alone
+    count_boxes(LAUNCH_PIXEL, origin, direction, tmax);
 }
 
 // See `no_rays.glsl`.

@@ -21,6 +21,7 @@ const COMPARED: &[&str] = &[
     "rt_lightSelection",
     "rt_taaRays",
     "rt_taaMaximum",
+    "rt_hitFeedback",
 ];
 
 /// A row of a table. The help of variables without effect ends with a sentence that their table states once.

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::Renderer;
 use crate::api::{MarkFragment, Orientation, PointLighting};
 use crate::error::Error;
-use crate::statistics::{Costs, LightCost, StructureCost};
+use crate::statistics::{Costs, LightCost, MovingCost, StructureCost};
 use crate::trace::TraceLook;
 use crate::world::{LightsChanged, Marked, World};
 
@@ -104,12 +104,18 @@ impl Renderer {
             memory: Costs::memory(&self.device.memory_uses()),
             reserved: self.device.memory_report().reserved,
             latency: self.latency(),
+            moving: self.moving_cost().filter(|cost| cost.counted > 0),
         }
     }
 
     /// Cost of the map's structures; `None` without the traced look.
     pub fn structure_cost(&self) -> Option<StructureCost> {
         self.trace.as_ref().map(TraceLook::structure_cost)
+    }
+
+    /// Cost of the structures of what moves, summed over frames; `None` without the traced look.
+    pub fn moving_cost(&self) -> Option<MovingCost> {
+        self.trace.as_ref().map(TraceLook::moving_cost)
     }
 
     /// Cost of the structures from which the map's lights are sampled; `None` if there are none.

@@ -42,7 +42,7 @@ pub use flares::ViewFlare;
 #[cfg(test)]
 pub use look::TracedPart;
 pub use look::{ClassicPart, ClassicScene, LookPart, LookPartMut, TracedScene};
-pub use rigid::{MeshId, RigidMesh, Shape};
+pub use rigid::{MeshId, RigidMesh, Shape, finite_bounds};
 pub use shadow_volumes::ShadowVolumes;
 pub(crate) use shapes::perpendicular;
 pub use sky::{CELLS as SKY_CELLS, Cells, FACES as SKY_FACES, SkyCoverage, VisibleSky};

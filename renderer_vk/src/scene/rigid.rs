@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use shaders::types::Vertex;
+use support::Aabb;
 
 /// Number of views after which an undrawn mesh is dropped.
 const KEPT: u64 = 1000;
@@ -29,6 +30,8 @@ pub struct RigidMesh {
     pub vertices: Vec<Vertex>,
     /// Indices into `vertices`, three a triangle.
     pub indices: Vec<u32>,
+    /// Bounds of the finite vertices.
+    pub bounds: Aabb,
 }
 
 impl RigidMesh {
@@ -37,10 +40,17 @@ impl RigidMesh {
         static NEXT: AtomicU64 = AtomicU64::new(1);
         Self {
             id: NEXT.fetch_add(1, Ordering::Relaxed),
+            bounds: finite_bounds(&vertices),
             vertices,
             indices,
         }
     }
+}
+
+/// Bounds of the finite vertices.
+pub fn finite_bounds(vertices: &[Vertex]) -> Aabb {
+    let positions = vertices.iter().map(|v| v.position);
+    Aabb::of(positions.filter(|p| p.is_finite()))
 }
 
 /// Part of a mesh that stays the same from frame to frame.

@@ -43,6 +43,18 @@ numbered! {
 }
 
 numbered! {
+    /// Feedback of rays on the structures of bodies.
+    HitFeedback {
+        /// None.
+        None = 0,
+        /// Bodies that few rays meet are refitted seldom or left out.
+        Acts = 1,
+        /// Rays are counted, for statistics.
+        Counts = 2,
+    }
+}
+
+numbered! {
     /// Filter of traced light.
     DenoiserChoice {
         /// No filter.

@@ -5,6 +5,7 @@
 //! each frame. All builds of a frame are one batch.
 
 use std::iter;
+use std::time::Instant;
 
 use glam::{Mat3, Vec3};
 use shaders::trace_types::constants::{INSTANCE_GRID, NO_INSTANCE};
@@ -14,15 +15,17 @@ use support::bvh::Hierarchy;
 use support::slice;
 
 use super::bvh::{INSTANCES, build_triangles, widen};
+use super::feedback::{Feedback, State};
 use super::geometry::{StaticGeometry, StaticPart, Structure};
 use super::input::{Kind, MaterialTable};
 use super::parts::{Parts, Seen, Slot, axes, is_solid};
-use super::shapes::{Bottom, OwnBottom, Shapes};
+use super::shapes::{Bottom, OwnBottom, Shapes, Use};
 use super::tracer::Tracer;
 use crate::gpu::{
     self, Access, Blas, BlasBuild, BlasFlags, BlasGeometry, Device, Error, Recorder, Tlas,
 };
 use crate::scene::TracedScene;
+use crate::statistics::MovingCost;
 
 /// Hit group: solids report the nearest hit, translucent layers search in their any-hit shader.
 fn hit_group(kind: Kind) -> u32 {
@@ -197,6 +200,8 @@ pub struct Accel {
     own_bytes: [u64; 2],
     /// Makes a top level of the models alone, too.
     has_models: bool,
+    /// Sums over frames.
+    cost: MovingCost,
 }
 
 impl Accel {
@@ -219,6 +224,7 @@ impl Accel {
             shapes: Shapes::new(device, tracer),
             own_bytes: [0; 2],
             has_models: false,
+            cost: MovingCost::default(),
         }
     }
 
@@ -256,6 +262,11 @@ impl Accel {
         self.shapes.counts()
     }
 
+    /// Sums over all frames.
+    pub fn cost(&self) -> MovingCost {
+        self.cost
+    }
+
     /// Builds the structures of a view. `geometry`: the map, if the view shows it.
     ///
     /// # Errors
@@ -267,6 +278,22 @@ impl Accel {
         geometry: Option<&StaticGeometry>,
         materials: &dyn MaterialTable,
     ) -> Result<AccelOutput, Error> {
+        self.record_fed(rec, view, geometry, materials, &mut Feedback::default())
+    }
+
+    /// As [`record`](Self::record), of bodies in the states of `feedback`, and lists their geometries there.
+    ///
+    /// # Errors
+    /// Out of memory, or a lost device.
+    pub fn record_fed(
+        &mut self,
+        rec: &mut Recorder,
+        view: &TracedScene,
+        geometry: Option<&StaticGeometry>,
+        materials: &dyn MaterialTable,
+        feedback: &mut Feedback,
+    ) -> Result<AccelOutput, Error> {
+        let begin = Instant::now();
         self.parts.collect(view, materials);
         self.shapes.begin_view();
         let vertices = rec.arena().push(&view.vertices)?;
@@ -280,13 +307,25 @@ impl Accel {
         if let Some(geometry) = geometry {
             placements.add_map(view, geometry);
         }
+        feedback.begin_geometries(placements.records.len());
         for (index, part) in self.parts.parts.iter().enumerate() {
+            let state = feedback.state(part.instance);
+            if state == State::Inactive {
+                self.cost.left_out_parts += u64::from(part.animated);
+                continue;
+            }
             let Some(instance) = slice::get(&view.instances, part.instance as usize) else {
                 continue;
             };
+            let pose = Use {
+                body: feedback.body(part.instance),
+                refit: state == State::Active,
+            };
             let prepared = self
                 .shapes
-                .prepare(rec, view, &self.parts, part, vertices)?;
+                .prepare(rec, view, &self.parts, part, vertices, pose)?;
+            self.cost.parts += u64::from(part.animated);
+            feedback.add_geometry(part.instance, part.animated);
             let record = GeometryRecord {
                 triangles: prepared.triangles,
                 vertices: prepared.vertices,
@@ -323,6 +362,9 @@ impl Accel {
         } else {
             [output.top, output.models] = self.build_own(rec, &placed)?;
         }
+        self.cost.frames += 1;
+        self.cost.refits = self.shapes.refits();
+        self.cost.cpu_ms += begin.elapsed().as_secs_f64() * 1e3;
         Ok(output)
     }
 

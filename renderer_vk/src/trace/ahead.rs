@@ -3,7 +3,7 @@
 use super::light_selection::{reuses_samples, samples_one_light};
 use super::pass_set::PassSet;
 use super::passes::{Pass, Switch};
-use super::{antialias, denoise, indirect, light_selection, photons, screen};
+use super::{antialias, denoise, feedback, indirect, light_selection, photons, screen};
 use crate::gpu::Error;
 use crate::settings::{Anaglyph, DenoiserChoice, Settings};
 
@@ -142,6 +142,7 @@ fn states(pass: Pass, settings: &Settings, needs: MapNeeds) -> Vec<usize> {
             Switch::Ambient => indirect::adds_ambient(settings),
             Switch::MoreSamples => antialias::traces_more(settings),
             Switch::SmoothMaximum => antialias::smooths_maximum(settings),
+            Switch::Feedback => feedback::in_use(settings),
         };
         if !on {
             continue;

@@ -50,6 +50,8 @@ pub struct FrameFacts {
     pub more_samples: bool,
     /// The maximum of the colour range of antialiasing is smoothed over time.
     pub smooth_maximum: bool,
+    /// Rays count the bodies that they meet.
+    pub feedback: bool,
 }
 
 impl FrameFacts {
@@ -70,6 +72,7 @@ impl FrameFacts {
             Switch::Ambient => self.ambient,
             Switch::MoreSamples => self.more_samples,
             Switch::SmoothMaximum => self.smooth_maximum,
+            Switch::Feedback => self.feedback,
         }
     }
 

@@ -29,7 +29,7 @@ use crate::gpu::{ColorMask, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
 use crate::scene::TracedScene;
 use crate::settings::Settings;
-use crate::statistics::{LightCost, StructureCost};
+use crate::statistics::{LightCost, MovingCost, StructureCost};
 use crate::world::World;
 
 /// Sort value of the engine's first class of blended surfaces (`SS_BLEND0`).
@@ -428,6 +428,11 @@ impl TraceLook {
     /// Cost of the structures of the map's constant geometry.
     pub fn structure_cost(&self) -> StructureCost {
         self.geometry.cost
+    }
+
+    /// Cost of the structures of what moves, summed over frames.
+    pub fn moving_cost(&self) -> MovingCost {
+        self.tracer.moving_cost()
     }
 
     /// Bytes of the acceleration structures, by content.

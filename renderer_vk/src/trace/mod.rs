@@ -22,6 +22,7 @@ pub mod counters;
 pub mod cutout;
 pub mod denoise;
 mod doubled;
+mod feedback;
 pub mod fog;
 mod fog_light;
 mod frame_lights;

@@ -96,7 +96,15 @@ pub(super) struct Followed {
 }
 
 impl Motion {
-    /// Matches a view with the last one and stores it for the next. `vertices`: device address of the view's vertices;
+    /// For each entity of a view, the index of its match in the last view.
+    pub fn matches(&self, view: &TracedScene) -> Vec<Option<usize>> {
+        match &self.past {
+            Some(past) => past.match_entities(&view.look.entities, view.time - past.time),
+            None => vec![None; view.look.entities.len()],
+        }
+    }
+
+    /// Matches a view with the last one and stores it for the next. `matches`: of [`matches`](Self::matches); `vertices`: device address of the view's vertices;
     /// `camera_rests`: the camera has not moved.
     ///
     /// # Errors
@@ -106,11 +114,11 @@ impl Motion {
         rec: &mut Recorder,
         view: &TracedScene,
         portals: &[PortalRecord],
-        vertices: u64,
+        (matches, vertices): (Vec<Option<usize>>, u64),
         targets: &Targets,
         camera_rests: bool,
     ) -> Result<MotionView, Error> {
-        let found = self.follow(view, portals);
+        let found = self.follow(view, portals, matches);
         Ok(MotionView {
             vertices,
             vertex_bytes: size_of_val(view.vertices.as_slice()) as u64,
@@ -125,7 +133,12 @@ impl Motion {
     }
 
     /// Matches all geometry of a view with the last view, and stores the view for the next frame.
-    pub(super) fn follow(&mut self, view: &TracedScene, portals: &[PortalRecord]) -> Followed {
+    pub(super) fn follow(
+        &mut self,
+        view: &TracedScene,
+        portals: &[PortalRecord],
+        matches: Vec<Option<usize>>,
+    ) -> Followed {
         // The first view has no predecessor.
         let past = self.past.take().unwrap_or_default();
         let mut found = Followed {
@@ -139,7 +152,6 @@ impl Motion {
         }
         past.follow_world(view, &mut found.positions);
         let passed = view.time - past.time;
-        let matches = past.match_entities(&view.look.entities, passed);
         let mut velocities = vec![Vec3::ZERO; view.look.entities.len()];
         for ((entity, found_again), velocity) in
             view.look.entities.iter().zip(matches).zip(&mut velocities)

@@ -79,6 +79,8 @@ pub enum Switch {
     SmoothMaximum,
     /// Pixels without history have more samples.
     MoreSamples,
+    /// Rays count the bodies that they meet (`rt_hitFeedback`).
+    Feedback,
 }
 
 /// Declaration of a pass.
@@ -139,7 +141,7 @@ macro_rules! passes {
         /// Declarations, in the order of [`Pass`].
         pub static TABLE: &[Row] = {
             #[allow(clippy::enum_glob_use)] // rows name many of them
-            use {Resource::*, Shader::{Compute, Rays}, Switch::{Adaptive, BlueNoise, Bounces, Caustics, Gloss, LightTree, LitFog, MapFog, Roulette, SharedEyes, Timed}};
+            use {Resource::*, Shader::{Compute, Rays}, Switch::{Adaptive, BlueNoise, Bounces, Caustics, Feedback, Gloss, LightTree, LitFog, MapFog, Roulette, SharedEyes, Timed}};
             &[$(Row { $($field: $value,)* ..Row::of(concat!($($about),+), $name, $shader, Size::$size) }),+]
         };
     };
@@ -148,7 +150,7 @@ macro_rules! passes {
 passes! {
     /// First hits of the camera's rays.
     PrimaryRays = "trace_primary_rays", Rays(&shaders::TRACE_PRIMARY_RAYS), Traced {
-        switches: &[(ids::clock::TIMED, Timed)],
+        switches: &[(ids::clock::TIMED, Timed), (ids::feedback::HIT_FEEDBACK, Feedback)],
         reads: &[Scene],
         writes: &[PrimaryHits],
         counter: Some(t::COUNT_PRIMARY_RAYS),
@@ -162,7 +164,7 @@ passes! {
     /// The surface that each other pixel shows behind mirrors, portals, glass and liquids, with the layers in front of
     /// it.
     Primary = "trace_primary", Rays(&shaders::TRACE_PRIMARY), Traced {
-        switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed)],
+        switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed), (ids::feedback::HIT_FEEDBACK, Feedback)],
         reads: &[Scene, PrimaryHits],
         writes: &[GBuffer, Positions, Normals, Shown, FogWeights, FogPoints, GlossSurfaces],
         counter: Some(t::COUNT_PRIMARY),
@@ -170,7 +172,7 @@ passes! {
     /// The side of glass or of a glossy surface that a pixel does not show.
     OtherSide = "trace_other_side", Rays(&shaders::TRACE_PRIMARY), Traced {
         shares: Some(Pass::Primary),
-        switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed)],
+        switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed), (ids::feedback::HIT_FEEDBACK, Feedback)],
         reads: &[Scene, PrimaryHits, GBuffer],
         writes: &[Other],
     }
@@ -182,12 +184,13 @@ passes! {
     }
     /// Visibility of flares.
     FlareRays = "trace_flares", Rays(&shaders::TRACE_FLARES), Flares {
+        switches: &[(ids::feedback::HIT_FEEDBACK, Feedback)],
         reads: &[Scene],
         writes: &[FlareStates],
     }
     /// Photons from lamps and suns through refracting bodies (`rt_caustics`).
     Photons = "trace_photons", Rays(&shaders::TRACE_PHOTONS), Photons {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::lights::LIGHT_TREE, LightTree)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::lights::LIGHT_TREE, LightTree), (ids::feedback::HIT_FEEDBACK, Feedback)],
         reads: &[Scene, Lights],
         writes: &[Photons],
         counter: Some(t::COUNT_PHOTONS),
@@ -212,7 +215,7 @@ passes! {
     /// Shadow rays to the sampled lights.
     SampledDirect = "trace_direct", Rays(&shaders::TRACE_DIRECT), RayTiles {
         constants: &[(ids::direct::SAMPLING, t::SAMPLING_LIGHT)],
-        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
+        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::feedback::HIT_FEEDBACK, Feedback)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, SampledLights],
         may_read: &[GradientPixels, PhotonCells],
         writes: &[DirectLight],
@@ -221,7 +224,7 @@ passes! {
     /// Shadow rays to suns, whose light is added.
     Suns = "trace_suns", Rays(&shaders::TRACE_DIRECT), RayTiles {
         constants: &[(ids::direct::SAMPLING, t::SAMPLING_SUNS)],
-        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
+        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::feedback::HIT_FEEDBACK, Feedback)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, SampledLights, DirectLight],
         may_read: &[GradientPixels, PhotonCells],
         writes: &[DirectLight],
@@ -229,14 +232,14 @@ passes! {
     }
     /// A light sample for each pixel, tested by a ray and joined with that of the last frame (`rt_lightSelection 3`).
     ReservoirSamples = "trace_direct", Rays(&shaders::TRACE_RESERVOIR_SAMPLES), Traced {
-        switches: &[(ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
+        switches: &[(ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::feedback::HIT_FEEDBACK, Feedback)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals],
         writes: &[Reservoirs],
         counter: Some(t::COUNT_DIRECT),
     }
     /// Joins the samples of neighbouring pixels; light of the result, and of a sun.
     ReservoirReuse = "trace_direct", Rays(&shaders::TRACE_RESERVOIR_REUSE), Traced {
-        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise)],
+        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::feedback::HIT_FEEDBACK, Feedback)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, Reservoirs],
         may_read: &[PhotonCells],
         writes: &[DirectLight],
@@ -244,7 +247,7 @@ passes! {
     }
     /// Direct light where a pixel samples several lights or all.
     Direct = "trace_direct", Rays(&shaders::TRACE_DIRECT), Traced {
-        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::lights::LIGHT_TREE, LightTree)],
+        switches: &[(ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::lights::LIGHT_TREE, LightTree), (ids::feedback::HIT_FEEDBACK, Feedback)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals],
         may_read: &[GradientPixels, PhotonCells],
         writes: &[DirectLight],
@@ -252,7 +255,7 @@ passes! {
     }
     /// Light that flat mirrors of the map reflect onto the surfaces from which a bounce starts.
     MirrorLight = "trace_mirror_light", Rays(&shaders::TRACE_MIRROR_LIGHT), Cells {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::subsample::ADAPTIVE, Adaptive), (ids::lights::LIGHT_TREE, LightTree)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::subsample::ADAPTIVE, Adaptive), (ids::lights::LIGHT_TREE, LightTree), (ids::feedback::HIT_FEEDBACK, Feedback)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals],
         may_read: &[GradientPixels, BounceLights, SelectedCells],
         writes: &[BounceLights],
@@ -273,7 +276,7 @@ passes! {
     }
     /// Rays of a bounce.
     BounceRays = "trace_bounce_rays", Rays(&shaders::TRACE_BOUNCE_RAYS), Cells {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive), (ids::bounce_rays::ROULETTE, Roulette)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive), (ids::bounce_rays::ROULETTE, Roulette), (ids::feedback::HIT_FEEDBACK, Feedback)],
         reads: &[Scene, GBuffer, Positions, Normals],
         may_read: &[GradientPixels, BounceLights, GlossSurfaces, ScreenHits, SelectedCells, DirectLight],
         writes: &[BounceHits],
@@ -296,7 +299,7 @@ passes! {
     }
     /// Shadow rays to those lights; the last writes the light of the paths, of one of both kinds.
     BounceLight = "trace_bounce_light", Rays(&shaders::TRACE_BOUNCE_LIGHT), Cells {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::subsample::ADAPTIVE, Adaptive)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::subsample::ADAPTIVE, Adaptive), (ids::feedback::HIT_FEEDBACK, Feedback)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceLights],
         may_read: &[GradientPixels, GlossSurfaces, SelectedCells],
         writes: &[IndirectLight, GlossLight],
@@ -305,7 +308,7 @@ passes! {
     /// Specular light of sampled lights at rough surfaces. The passes of a bounce then trace its other paths.
     SpecularLight = "trace_specular_light", Rays(&shaders::TRACE_SPECULAR_LIGHT), Cells {
         constants: &[(ids::specular::HAS_GLOSS, 1)],
-        switches: &[(ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::lights::LIGHT_TREE, LightTree)],
+        switches: &[(ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::lights::LIGHT_TREE, LightTree), (ids::feedback::HIT_FEEDBACK, Feedback)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, GlossSurfaces],
         writes: &[BounceLights],
         counter: Some(t::COUNT_SPECULAR),
@@ -385,7 +388,7 @@ passes! {
     }
     /// Light at the points in fog.
     FogLight = "trace_fog", Rays(&shaders::TRACE_FOG_LIGHT), FogCells {
-        switches: &[(ids::lights::LIGHT_TREE, LightTree)],
+        switches: &[(ids::lights::LIGHT_TREE, LightTree), (ids::feedback::HIT_FEEDBACK, Feedback)],
         reads: &[Scene, Lights, FogPoints],
         writes: &[FogLight],
     }

@@ -20,7 +20,7 @@ use super::tracer::Tracer;
 use crate::gpu::{BlasBuild, Buffer, BufferUsage, CompactedSizes, Device, Error, Pass, Recorder};
 use crate::scene::TracedScene;
 
-use animated::{AnimatedShape, Scratch};
+use animated::{AnimatedShape, PoseKey, Scratch};
 use rigid::RigidShape;
 
 /// Number of frames out of view after which a structure is dropped.
@@ -60,8 +60,17 @@ pub struct Prepared {
     pub vertices: u64,
     /// Address of its `Triangle`s.
     pub triangles: u64,
-    /// Index of an animated part's pose.
-    pose: usize,
+    /// An animated part's pose.
+    pose: PoseKey,
+}
+
+/// How a view uses an animated part.
+#[derive(Clone, Copy, Debug)]
+pub struct Use {
+    /// Number of its body; `None`: the part is not followed over frames.
+    pub body: Option<u32>,
+    /// Its structure must have this frame's shape.
+    pub refit: bool,
 }
 
 /// Bytes of the structures, by use.
@@ -110,7 +119,7 @@ impl Shapes {
     pub fn begin_view(&mut self) {
         self.frame += 1;
         for shape in self.animated.values_mut() {
-            shape.begin_view();
+            shape.begin_view(self.frame);
         }
         if !self.frame.is_multiple_of(KEPT / 4) {
             return;
@@ -123,6 +132,11 @@ impl Shapes {
         for shape in self.animated.values_mut() {
             shape.drop_poses(fresh);
         }
+    }
+
+    /// Number of refits and builds of animated parts, over all frames.
+    pub fn refits(&self) -> u64 {
+        self.scratch.refits
     }
 
     /// Number of kept shapes: of constant shape, and refitted structures.
@@ -154,15 +168,21 @@ impl Shapes {
         parts: &Parts,
         part: &Part,
         vertices: u64,
+        used: Use,
     ) -> Result<Prepared, Error> {
         let meshes = members(view, parts, part);
         let key = slice::part(&parts.shapes, part.members.clone());
         let (address, pose, version) = if part.animated {
             let vertices = vertices + (part.vertices.start * size_of::<Vertex>()) as u64;
-            let (pose, version) = self.prepare_animated(rec, view, part, key, &meshes, vertices)?;
+            let (pose, version) =
+                self.prepare_animated(rec, view, part, (key, used), &meshes, vertices)?;
             (vertices, pose, version)
         } else {
-            (self.prepare_rigid(part, key, &meshes)?, 0, 0)
+            (
+                self.prepare_rigid(part, key, &meshes)?,
+                PoseKey::default(),
+                0,
+            )
         };
         let skin = slice::part(&parts.skins, part.members.clone());
         Ok(Prepared {
@@ -267,16 +287,16 @@ impl Shapes {
         Ok(vertices)
     }
 
-    /// Index of the shape's pose, and the version of its triangles.
+    /// The shape's pose, and the version of its triangles.
     fn prepare_animated(
         &mut self,
         rec: &mut Recorder,
         view: &TracedScene,
         part: &Part,
-        key: &[ShapeMesh],
+        (key, used): (&[ShapeMesh], Use),
         meshes: &[MeshPart<'_>],
         vertices: u64,
-    ) -> Result<(usize, u64), Error> {
+    ) -> Result<(PoseKey, u64), Error> {
         let same = (self.animated.get(key)).is_some_and(|shape| shape.has_triangles_of(meshes));
         if !same {
             self.versions += 1;
@@ -286,15 +306,15 @@ impl Shapes {
             self.animated.insert(key.into(), shape);
         }
         let Some(shape) = self.animated.get_mut(key) else {
-            return Ok((0, 0)); // just inserted
+            return Ok((PoseKey::default(), 0)); // just inserted
         };
         shape.seen = self.frame;
-        let used = slice::part(&view.vertices, part.vertices.clone());
+        let posed = slice::part(&view.vertices, part.vertices.clone());
         let pose = shape.take_pose(
             rec,
             &self.device,
-            part.kind,
-            used,
+            (part.kind, used),
+            posed,
             vertices,
             &mut self.scratch,
         )?;

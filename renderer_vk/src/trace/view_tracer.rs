@@ -14,6 +14,7 @@ use super::bloom::Bloom;
 use super::blue_noise::BlueNoise;
 use super::counters::RayCounters;
 use super::denoise::{self, Denoiser, OtherEye};
+use super::feedback::Feedback;
 use super::fog::LitFog;
 use super::frame_passes::{FrameFacts, FramePasses};
 use super::geometry::StaticGeometry;
@@ -35,6 +36,7 @@ use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
 use crate::scene::TracedScene;
 use crate::settings::{DebugOutput, DenoiserChoice, Settings};
+use crate::statistics::MovingCost;
 use crate::stereo::Stereo;
 use crate::world::outside;
 use content::content_hash;
@@ -78,6 +80,7 @@ pub struct ViewTracer {
     pub(super) denoiser: Denoiser,
     pub(super) antialias: Antialias,
     motion: Motion,
+    pub(super) feedback: Feedback,
     bloom: Bloom,
     blue_noise: BlueNoise,
     screen: LastScreen,
@@ -136,6 +139,7 @@ impl ViewTracer {
             denoiser: Denoiser::new(device)?,
             antialias: Antialias::new(device)?,
             motion: Motion::default(),
+            feedback: Feedback::default(),
             bloom: Bloom::default(),
             blue_noise: BlueNoise::default(),
             screen: LastScreen::default(),
@@ -178,6 +182,11 @@ impl ViewTracer {
     pub fn hdr(&self) -> Option<&Image> {
         let targets = self.targets.as_ref()?;
         Some(self.antialias.picture().unwrap_or(targets.picture()))
+    }
+
+    /// Cost of the structures of what moves, summed over frames.
+    pub fn moving_cost(&self) -> MovingCost {
+        self.accel.cost().with_feedback(self.feedback.cost)
     }
 
     /// Rays of each counter (`COUNT_*`) in the newest finished frame; `None` while rays are not counted.
@@ -239,6 +248,7 @@ impl ViewTracer {
         self.accumulated = (0, 0);
         self.history = None;
         self.motion = Motion::default();
+        self.feedback.forget();
         self.antialias.reset();
         self.fog.reset();
         self.exposure_started = false;
@@ -344,9 +354,12 @@ impl ViewTracer {
         self.photons.prepare(&self.device, caustics)?;
         (self.screen).prepare(&self.device, settings, size, goes_on)?;
         let accumulated = self.accumulated_before(scene, materials, settings);
-        let accel = self
-            .accel
-            .record(rec, scene, map.map(|m| m.geometry), materials)?;
+        let matches = self.motion.matches(scene);
+        (self.feedback).begin(rec, scene, settings, size[0] * size[1], &matches)?;
+        let map_geometry = map.map(|m| m.geometry);
+        let (accel, feedback) = (&mut self.accel, &mut self.feedback);
+        let accel = accel.record_fed(rec, scene, map_geometry, materials, feedback)?;
+        let feedback = self.feedback.count(rec)?;
         let portals: Vec<PortalRecord> = if settings.hides_portals() {
             Vec::new()
         } else {
@@ -354,7 +367,8 @@ impl ViewTracer {
         };
         let camera_rests = self.history == Some(camera_frame(scene));
         let vertices = accel.vertices;
-        let motion = (self.motion).record(rec, scene, &portals, vertices, targets, camera_rests)?;
+        let (motion, known) = (&mut self.motion, (matches, vertices));
+        let motion = motion.record(rec, scene, &portals, known, targets, camera_rests)?;
         let show_rays = settings.rt_debug == DebugOutput::Rays;
         let counting = (self.counters).begin(rec, size, self.count_rays, show_rays)?;
         let timing = self.pixel_times.begin(rec, size, settings.rt_debug)?;
@@ -379,6 +393,7 @@ impl ViewTracer {
             accumulated,
             portals: &portals,
             motion,
+            feedback,
             antialias,
             post,
         };
@@ -426,6 +441,8 @@ impl ViewTracer {
         indirect::filter_specular(passes)?;
         // after the denoiser, which is the last to read the positions that the filtered light overwrites
         self.fog.record(passes, &targets.fog)?;
+        self.counters.end(passes.rec)?;
+        self.feedback.end(passes.rec)?;
         passes.run(Pass::Composite)?;
         self.screen.keep_light(passes)?;
         self.antialias.record(passes)?;
@@ -468,6 +485,7 @@ impl ViewTracer {
             ambient: indirect::adds_ambient(settings),
             more_samples: antialias::traces_more(settings),
             smooth_maximum: antialias::smooths_maximum(settings),
+            feedback: self.feedback.is_on(),
         }
     }
 

@@ -87,6 +87,11 @@ pub const VIEW_DENOISE: u32 = 256;
 /// One of each 2 × 2 pixels gathers bounced light, alternating over frames.
 pub const VIEW_SUBSAMPLED_BOUNCE: u32 = 512;
 
+/// Of this many invocations one counts the boxes on its rays, for `rt_hitFeedback`.
+pub const FEEDBACK_RAYS: u32 = 16;
+/// A counter with so many rays is not raised further: more change nothing, and writes to one address wait for each other.
+pub const FEEDBACK_MOST: u32 = 1024;
+
 /// The views of `rt_debug`: `PostView::debug`.
 pub const DEBUG_ALBEDO: u32 = 1;
 pub const DEBUG_NORMALS: u32 = 2;

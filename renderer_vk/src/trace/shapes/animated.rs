@@ -4,6 +4,11 @@
 //! Rebuilds: our own hierarchies compute their expected ray cost, and are rebuilt once it exceeds [`WORSE`] times its
 //! initial value. The driver reports no cost; its structures are rebuilt after [`REFITS`] frames, and at once when the
 //! surface area of the bounds has changed by the factor [`GROWN`] in either direction.
+//!
+//! With `rt_hitFeedback` an entity keeps its structure from frame to frame, and one that few rays meet is refitted only
+//! every [`OMITTED`]th frame.
+
+use std::collections::HashMap;
 
 use glam::Vec3;
 #[cfg(test)]
@@ -16,7 +21,7 @@ use super::super::bvh::{TRIANGLES, ordered, widen};
 use super::super::input::Kind;
 use super::super::part_mesh::{MeshPart, geometry, is_same, part_indices};
 use super::super::tracer::Tracer;
-use super::{Bottom, OwnBottom};
+use super::{Bottom, OwnBottom, Use};
 use crate::gpu::{
     Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error, Recorder,
 };
@@ -27,6 +32,8 @@ const WORSE: f32 = 1.5;
 const REFITS: u32 = 60;
 /// Ratio of the surface areas of the bounds at which a structure of the driver is rebuilt.
 const GROWN: f32 = 2.0;
+/// Frames between two refits of what few rays meet.
+const OMITTED: u64 = 32;
 
 /// Constant triangles of parts with moving vertices.
 pub struct AnimatedShape {
@@ -41,6 +48,23 @@ pub struct AnimatedShape {
     poses: Vec<Pose>,
     /// Number of poses used in this view.
     taken: usize,
+    /// Those of bodies that are followed over frames.
+    of_bodies: HashMap<u32, Pose>,
+}
+
+/// A pose of a shape.
+#[derive(Clone, Copy, Debug)]
+pub enum PoseKey {
+    /// By its order in the view.
+    Ordered(usize),
+    /// By the number of its body.
+    OfBody(u32),
+}
+
+impl Default for PoseKey {
+    fn default() -> Self {
+        Self::Ordered(0)
+    }
 }
 
 /// A structure that is refitted.
@@ -63,12 +87,16 @@ enum PoseBottom {
         /// Expected ray cost at the last build.
         cost: f32,
         bottom: Option<OwnBottom>,
+        /// Nodes and triangles of `bottom`, if they last longer than a frame.
+        kept: Option<Buffer>,
     },
 }
 
-/// Reused memory for refits of our hierarchies.
+/// Reused memory for refits of our hierarchies, and their number.
 #[derive(Default)]
 pub struct Scratch {
+    /// Number of all refits and builds.
+    pub refits: u64,
     boxes: Vec<Aabb>,
     corners: Vec<[Vec3; 3]>,
 }
@@ -94,8 +122,9 @@ impl AnimatedShape {
             let input = BufferUsage::ACCEL_INPUT;
             Some(Buffer::with_data(device, name, input, &indices)?)
         };
-        let (mut poses, taken) = old.map_or((Vec::new(), 0), |s| (s.poses, s.taken));
-        for pose in &mut poses {
+        let (mut poses, taken, mut of_bodies) =
+            old.map_or_else(Default::default, |s| (s.poses, s.taken, s.of_bodies));
+        for pose in poses.iter_mut().chain(of_bodies.values_mut()) {
             pose.forget();
         }
         Ok(Self {
@@ -105,12 +134,22 @@ impl AnimatedShape {
             index_buffer,
             poses,
             taken,
+            of_bodies,
         })
     }
 
-    /// Begins a view.
-    pub fn begin_view(&mut self) {
+    /// Begins a view, of number `frame`; drops poses of bodies that the last view did not have.
+    pub fn begin_view(&mut self, frame: u64) {
         self.taken = 0;
+        self.of_bodies.retain(|_, pose| pose.seen + 1 >= frame);
+    }
+
+    fn all(&self) -> impl Iterator<Item = &Pose> {
+        self.poses.iter().chain(self.of_bodies.values())
+    }
+
+    fn all_mut(&mut self) -> impl Iterator<Item = &mut Pose> {
+        self.poses.iter_mut().chain(self.of_bodies.values_mut())
     }
 
     /// Drops poses whose last frame is not `fresh`.
@@ -134,19 +173,23 @@ impl AnimatedShape {
     /// Number of kept structures.
     #[cfg(test)]
     pub fn pose_count(&self) -> usize {
-        self.poses.len()
+        self.all().count()
     }
 
     /// Bytes on the device.
     #[cfg(test)]
     pub fn size(&self) -> u64 {
         let indices = self.index_buffer.as_ref().map_or(0, Buffer::size);
-        indices + self.poses.iter().map(Pose::size).sum::<u64>()
+        indices + self.all().map(Pose::size).sum::<u64>()
     }
 
     /// A pose's structure for the top level.
-    pub fn bottom(&self, pose: usize) -> Option<Bottom> {
-        match &self.poses.get(pose)?.bottom {
+    pub fn bottom(&self, pose: PoseKey) -> Option<Bottom> {
+        let pose = match pose {
+            PoseKey::Ordered(index) => self.poses.get(index),
+            PoseKey::OfBody(body) => self.of_bodies.get(&body),
+        };
+        match &pose?.bottom {
             PoseBottom::Driver { blas, .. } => Some(Bottom::Driver(blas.address())),
             PoseBottom::Own { bottom, .. } => bottom.map(Bottom::Own),
         }
@@ -160,12 +203,12 @@ impl AnimatedShape {
             };
             pending.is_some()
         };
-        self.poses.iter().any(waits)
+        self.all().any(waits)
     }
 
     /// Build inputs of this frame's poses.
     pub fn pending(&mut self) -> impl Iterator<Item = BlasBuild<'_>> {
-        self.poses.iter_mut().filter_map(|pose| {
+        self.all_mut().filter_map(|pose| {
             if let PoseBottom::Driver {
                 blas,
                 pending: Some((geometries, refit)),
@@ -185,14 +228,14 @@ impl AnimatedShape {
 
     /// Marks all poses as built.
     pub fn settle(&mut self) {
-        for pose in &mut self.poses {
+        for pose in self.all_mut() {
             if let PoseBottom::Driver { pending, .. } = &mut pose.bottom {
                 *pending = None;
             }
         }
     }
 
-    /// Assigns the next pose to vertices and their device address, and returns its index: refits our own hierarchy at
+    /// Assigns a pose to vertices and their device address: that of the body, or the next. Refits our own hierarchy at
     /// once, leaves the driver's structure to [`pending`](Self::pending).
     ///
     /// # Errors
@@ -201,21 +244,46 @@ impl AnimatedShape {
         &mut self,
         rec: &mut Recorder,
         device: &Device,
-        kind: Kind,
+        (kind, used): (Kind, Use),
         vertices: &[Vertex],
         address: u64,
         scratch: &mut Scratch,
-    ) -> Result<usize, Error> {
-        let index = self.taken;
-        self.taken += 1;
-        if self.poses.len() <= index {
-            let own = self.index_buffer.is_none();
-            self.poses.push(Pose::new(device, own));
-        }
-        let Some(pose) = self.poses.get_mut(index) else {
-            return Ok(index); // just pushed
+    ) -> Result<PoseKey, Error> {
+        let own = self.index_buffer.is_none();
+        // a second part of this shape on one body is not followed
+        let is_free = |pose: &Pose| pose.seen != self.seen;
+        let body = used.body;
+        let body = body.filter(|body| self.of_bodies.get(body).is_none_or(is_free));
+        let (key, pose) = match body {
+            Some(body) => {
+                let pose = self.of_bodies.entry(body);
+                let pose = pose.or_insert_with(|| Pose::new(device, own));
+                (PoseKey::OfBody(body), Some(pose))
+            }
+            None => {
+                let index = self.taken;
+                self.taken += 1;
+                if self.poses.len() <= index {
+                    self.poses.push(Pose::new(device, own));
+                }
+                (PoseKey::Ordered(index), self.poses.get_mut(index))
+            }
+        };
+        let Some(pose) = pose else {
+            return Ok(key); // just pushed
         };
         pose.seen = self.seen;
+        let omitted = body.filter(|_| !used.refit);
+        // spreads the refits of omitted bodies over frames
+        let is_due = |body: u32| (self.seen + u64::from(body)).is_multiple_of(OMITTED);
+        if omitted.is_some_and(|body| !is_due(body)) && pose.is_kept() {
+            return Ok(key);
+        }
+        scratch.refits += 1;
+        let spread = match key {
+            PoseKey::Ordered(index) => u32::try_from(index).unwrap_or(0),
+            PoseKey::OfBody(body) => body,
+        };
         match &mut pose.bottom {
             PoseBottom::Driver {
                 blas,
@@ -230,7 +298,7 @@ impl AnimatedShape {
                     *refits += 1;
                 } else {
                     // spreads the rebuilds of entities that come into view together over frames
-                    *refits = u32::try_from(index).unwrap_or(0) % (REFITS / 2);
+                    *refits = spread % (REFITS / 2);
                     *area = bounds;
                 }
                 let at = self.index_buffer.as_ref().map_or(0, Buffer::address);
@@ -241,26 +309,39 @@ impl AnimatedShape {
                 hierarchy,
                 cost,
                 bottom,
+                kept,
             } => {
-                let Scratch { boxes, corners } = scratch;
+                let Scratch { boxes, corners, .. } = scratch;
                 let position = |i: u32| vertices.get(i as usize).map_or(Vec3::NAN, |v| v.position);
                 corners.clear();
                 corners.extend(self.indices.iter().map(|t| t.map(position)));
                 boxes.clear();
                 boxes.extend(corners.iter().map(|&c| Aabb::of(c)));
-                *bottom = fit(hierarchy, cost, boxes)
-                    .map(|bounds| {
-                        let triangles = ordered(hierarchy, corners);
-                        Ok::<_, Error>(OwnBottom {
-                            nodes: rec.arena().push(&widen(hierarchy))?,
-                            triangles: rec.arena().push(&triangles)?,
-                            bounds,
-                        })
-                    })
-                    .transpose()?;
+                (*bottom, *kept) = (None, None);
+                if let Some(bounds) = fit(hierarchy, cost, boxes) {
+                    let (nodes, triangles) = (widen(hierarchy), ordered(hierarchy, corners));
+                    let [nodes, triangles] = if omitted.is_some() {
+                        let bytes = [
+                            bytemuck::cast_slice::<_, u8>(&nodes),
+                            bytemuck::cast_slice(&triangles),
+                        ];
+                        let (name, storage) = ("trace animated kept", BufferUsage::STORAGE);
+                        let buffer = Buffer::with_data(device, name, storage, &bytes.concat())?;
+                        let address = buffer.address();
+                        *kept = Some(buffer);
+                        [address, address + size_of_val(nodes.as_slice()) as u64]
+                    } else {
+                        [rec.arena().push(&nodes)?, rec.arena().push(&triangles)?]
+                    };
+                    *bottom = Some(OwnBottom {
+                        nodes,
+                        triangles,
+                        bounds,
+                    });
+                }
             }
         }
-        Ok(index)
+        Ok(key)
     }
 }
 
@@ -272,6 +353,7 @@ impl Pose {
                 hierarchy: Hierarchy::default(),
                 cost: 0.0,
                 bottom: None,
+                kept: None,
             }
         } else {
             let flags = BlasFlags {
@@ -293,10 +375,22 @@ impl Pose {
     fn size(&self) -> u64 {
         match &self.bottom {
             PoseBottom::Driver { blas, .. } => blas.size(),
-            PoseBottom::Own { hierarchy, .. } => {
-                (hierarchy.node_count() * size_of::<BvhNode>()
-                    + hierarchy.order().len() * size_of::<BvhTriangle>()) as u64
+            PoseBottom::Own {
+                hierarchy, kept, ..
+            } => {
+                kept.as_ref().map_or(0, Buffer::size)
+                    + (hierarchy.node_count() * size_of::<BvhNode>()
+                        + hierarchy.order().len() * size_of::<BvhTriangle>())
+                        as u64
             }
+        }
+    }
+
+    /// Whether its structure lasts longer than a frame.
+    fn is_kept(&self) -> bool {
+        match &self.bottom {
+            PoseBottom::Driver { blas, area, .. } => blas.address() != 0 && *area > 0.0,
+            PoseBottom::Own { kept, .. } => kept.is_some(),
         }
     }
 
@@ -304,7 +398,9 @@ impl Pose {
     fn forget(&mut self) {
         match &mut self.bottom {
             PoseBottom::Driver { area, .. } => *area = 0.0,
-            PoseBottom::Own { hierarchy, .. } => *hierarchy = Hierarchy::default(),
+            PoseBottom::Own {
+                hierarchy, kept, ..
+            } => (*hierarchy, *kept) = (Hierarchy::default(), None),
         }
     }
 }

@@ -12,6 +12,7 @@ mod cut_outs;
 mod denoising;
 mod dielectrics;
 mod eyes;
+mod feedback;
 mod fewer_rays;
 mod fog;
 mod gradients;

@@ -307,7 +307,9 @@ fn entities_are_matched_between_frames() {
     let mut motion = Motion::default();
     let at = |x: f32| Vec3::X * x;
     let follow = |motion: &mut Motion, time: f32, list: &[(i32, Vec3)]| -> Vec<(u32, f32)> {
-        let found = motion.follow(&entities(time, list), &[]);
+        let view = entities(time, list);
+        let matches = motion.matches(&view);
+        let found = motion.follow(&view, &[], matches);
         let entity = |i: &shaders::trace_types::LastInstance| (i.known, i.origin.x);
         found.instances[1..].iter().map(entity).collect()
     };

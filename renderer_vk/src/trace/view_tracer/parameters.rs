@@ -3,8 +3,8 @@
 use glam::Vec3;
 use shaders::trace_types::constants as t;
 use shaders::trace_types::{
-    AntialiasView, CameraView, ExposureView, FlareView, ImageView, MotionView, PortalRecord,
-    PostView, SceneView, TargetView, TraceView, TransportView,
+    AntialiasView, CameraView, ExposureView, FeedbackView, FlareView, ImageView, MotionView,
+    PortalRecord, PostView, SceneView, TargetView, TraceView, TransportView,
 };
 use shaders::types::{SunDisc, constants::NO_TEXTURE};
 
@@ -33,6 +33,8 @@ pub(super) struct Prepared<'a> {
     pub portals: &'a [PortalRecord],
     /// Positions of the last frame.
     pub motion: MotionView,
+    /// Where rays count the bodies that they meet.
+    pub feedback: FeedbackView,
     /// Parameters of temporal antialiasing and upscaling.
     pub antialias: AntialiasView,
     /// Parameters of the passes after tracing, and the ray counters.
@@ -75,6 +77,7 @@ impl ViewTracer {
                 targets,
                 self.other_eye.as_ref(),
             ),
+            feedback: prepared.feedback,
             flares: FlareView {
                 flares: flares.flares,
                 states: flares.states,
