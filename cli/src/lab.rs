@@ -1,5 +1,6 @@
 //! The subcommands of `relight-lab`: measurements of the renderer, without an engine or a display.
 
+mod bodies;
 mod chromaticity;
 mod estimators;
 mod growth;
@@ -27,6 +28,7 @@ pub struct Cli {
 // No documentation comments on the variants: clap would show them in place of the descriptions of the arguments.
 #[derive(Subcommand, Debug)]
 enum Command {
+    Bodies(bodies::BodiesArgs),
     Estimators(estimators::EstimatorsArgs),
     Growth(growth::GrowthArgs),
     LightLists(light_lists::LightListsArgs),
@@ -47,6 +49,7 @@ const REPLACED: [(&str, &str, &str); 2] = [
 /// Those of the subcommand.
 pub fn run() -> Result<ExitCode> {
     match parse::<Cli>(&REPLACED).command {
+        Command::Bodies(args) => bodies::run(&args),
         Command::Estimators(args) => estimators::run(&args),
         Command::Growth(args) => growth::run(&args),
         Command::LightLists(args) => light_lists::run(&args),

@@ -197,6 +197,36 @@ fn tracers_are_compared() {
 }
 
 #[test]
+fn structures_of_bodies_are_measured_with_and_without_feedback() {
+    if !has_device() {
+        return;
+    }
+    let folder = room();
+    let arguments =
+        "bodies room.bsp --animated 4 --still 9 -o out.json --size 32x32 --frames 6 --runs 1";
+    let arguments: Vec<&str> = arguments.split(' ').collect();
+    let printed = run(LAB, folder.path(), &arguments);
+    let text = std::fs::read_to_string(folder.path().join("out.json")).unwrap();
+    let report: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!([&report["animated"], &report["still"]], [4, 9]);
+    let [without, with] = report["rows"].as_array().unwrap().as_slice() else {
+        panic!("{text}");
+    };
+    for (row, feedback) in [(without, false), (with, true)] {
+        assert_eq!(row["feedback"], feedback);
+        assert_eq!(row["moving"]["frames"], 3, "the second half");
+        assert_eq!(row["moving"]["parts"], 4 * 3);
+        assert_eq!(row["moving"]["refits"], 4 * 3, "nothing rests so early");
+    }
+    assert_eq!(without["moving"]["counted"], 0);
+    assert_eq!(with["moving"]["counted"], 4 * 3);
+    assert_eq!(with["moving"]["bodies"], 13 * 3);
+    assert_eq!(report["differing"], serde_json::json!([]));
+    let table = String::from_utf8_lossy(&printed.stdout);
+    assert!(table.contains("| without | 1.0000 |"), "{table}");
+}
+
+#[test]
 fn pictures_after_a_cut_and_of_a_walk_are_compared_with_the_reference() {
     if !has_device() {
         return;

@@ -147,6 +147,21 @@ pub struct MovingCost {
 }
 
 impl MovingCost {
+    /// What has come since `earlier`.
+    pub fn since(self, earlier: Self) -> Self {
+        Self {
+            frames: self.frames - earlier.frames,
+            cpu_ms: self.cpu_ms - earlier.cpu_ms,
+            parts: self.parts - earlier.parts,
+            left_out_parts: self.left_out_parts - earlier.left_out_parts,
+            refits: self.refits - earlier.refits,
+            counted: self.counted - earlier.counted,
+            unmet: self.unmet - earlier.unmet,
+            bodies: self.bodies - earlier.bodies,
+            left_out: self.left_out - earlier.left_out,
+        }
+    }
+
     /// With the counts of `feedback`, which has no others.
     pub(crate) fn with_feedback(self, feedback: Self) -> Self {
         Self {
