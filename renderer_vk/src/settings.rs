@@ -198,6 +198,7 @@ settings! { variables {
     rt_bounce_ambient: f32 = "rt_bounceAmbient", "0", ARCHIVE, kept(0.0, 4.0), Frame, Restarts, "Light of further bounces at the last one: this part of the map's light grid; 0 none.";
     rt_bounce_ambient_fall: f32 = "rt_bounceAmbientFall", "0", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "Exponential decrease of rt_bounceAmbient with the length of the last ray, 1/unit.";
     rt_hit_feedback: HitFeedback = "rt_hitFeedback", "0", ARCHIVE, kept(0.0, 2.0), Frame, GoesOn, "1 refits models that few rays meet seldom, and leaves them out where no ray passes; 2 only counts rays, for statistics.";
+    rt_bounce_cache: u32 = "rt_bounceCache", "0", ARCHIVE, kept(0.0, 64.0), Frame, Restarts, "Light samples of each vertex of the map in each sweep when it is first shown; bounces that hit the map take their light. 0 none.";
     rt_exposure: f32 = "rt_exposure", "0", ARCHIVE, kept(-16.0, 16.0), Frame, GoesOn, "Exposure in stops, added to the automatic one.";
     rt_auto_exposure: bool = "rt_autoExposure", "1", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 adapts the exposure to the picture.";
     rt_bloom: f32 = "rt_bloom", "0.05", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "Part of the light that spreads around bright things; 0 none.";

@@ -10,6 +10,7 @@ mod lights;
 mod photons;
 mod structures;
 mod surroundings;
+mod vertex_light;
 mod view;
 
 use bytemuck::{Pod, Zeroable};
@@ -27,6 +28,7 @@ pub use structures::{
     BvhInstance, BvhNode, BvhTriangle, FilterStep, GeometryRecord, GridRecord, HybridStep, PassStep,
 };
 pub use surroundings::{FlareView, FogView, MirrorPlane, PortalRecord, SkyRecord, TransportView};
+pub use vertex_light::{LightGrid, VertexLightView, VertexSum};
 pub use view::{CameraView, ExposureView, ImageView, PostView, SceneView, TargetView};
 
 /// Parameters of one traced view: the traced size, and a block for each concern. Blocks with addresses come first,
@@ -50,6 +52,8 @@ pub struct TraceView {
     pub photons: PhotonView,
     /// Light samples of the last frame.
     pub reservoirs: ReservoirView,
+    /// Light at vertices of the map.
+    pub vertex_light: VertexLightView,
     /// Motion of surfaces.
     pub motion: MotionView,
     /// Counts of rays that meet bodies.

@@ -2,6 +2,7 @@
 // Shades the hits of `bounce_rays.rgen` and samples a light for each; `bounce_light.rgen` traces the shadow rays.
 #include "trace/clock.glsl"
 #include "trace/screen.glsl"
+#include "trace/vertex_light.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -55,7 +56,13 @@ void main() {
         if (on_screen) screen_shade(hit, origin, throughput, b.found);
         onward = !on_screen && hit.geometry != NO_HIT && bounce_shade(hit, origin, chain, most, throughput, b.found, v);
         if (onward) {
-            if (v.chain == CHAIN_NONE) {
+            vec3 known;
+            if (VERTEX_LIGHT != 0 && v.chain == CHAIN_NONE && vertex_light_at(hit, v.face_normal, known)) {
+                b.found += throughput * known;
+                b.light = changing_light(v);
+                b.light.light *= throughput;
+                onward = false;
+            } else if (v.chain == CHAIN_NONE) {
                 b.light = vertex_light(v);
                 b.light.light *= throughput;
                 if (AMBIENT != 0) b.found += throughput * ambient_light(v, origin);

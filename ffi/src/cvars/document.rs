@@ -18,6 +18,7 @@ const COMPARED: &[&str] = &[
     "rt_bounceRoulette",
     "rt_bounceAmbient",
     "rt_bounceAmbientFall",
+    "rt_bounceCache",
     "rt_lightSelection",
     "rt_taaRays",
     "rt_taaMaximum",

@@ -3,14 +3,17 @@
 use super::light_selection::{reuses_samples, samples_one_light};
 use super::pass_set::PassSet;
 use super::passes::{Pass, Switch};
-use super::{antialias, denoise, feedback, indirect, light_selection, photons, screen};
+use super::{
+    antialias, denoise, feedback, indirect, light_selection, photons, screen, vertex_light,
+};
 use crate::gpu::Error;
 use crate::settings::{Anaglyph, DenoiserChoice, Settings};
 
 /// Passes that the settings decide about, or that every frame runs, the slowest to compile first. Others are
 /// compiled when a frame first runs them.
-const AHEAD: [Pass; 42] = [
+const AHEAD: [Pass; 45] = [
     Pass::Primary,
+    Pass::VertexGather,
     Pass::BounceShadeLast,
     Pass::BounceShade,
     Pass::Temporal,
@@ -52,6 +55,8 @@ const AHEAD: [Pass; 42] = [
     Pass::ScreenLight,
     Pass::BounceSelect,
     Pass::MoreSamples,
+    Pass::VertexWrite,
+    Pass::VertexSplit,
 ];
 /// Passes that only maps with fog run.
 const FOG_AHEAD: [Pass; 2] = [Pass::FogLight, Pass::FogFilter];
@@ -74,6 +79,9 @@ fn is_chosen(pass: Pass, settings: &Settings, needs: MapNeeds) -> bool {
         }
         Pass::ScreenSurface | Pass::ScreenMarch | Pass::ScreenLight => screen::in_use(settings),
         Pass::BounceSelect => indirect::is_adaptive(settings),
+        Pass::VertexSplit | Pass::VertexGather | Pass::VertexWrite => {
+            vertex_light::in_use(settings)
+        }
         Pass::SpecularLight => gloss,
         Pass::Photons | Pass::PhotonCells => needs.bodies && photons::in_use(settings),
         Pass::BounceUpsample => indirect::is_subsampled(settings, false),
@@ -143,6 +151,7 @@ fn states(pass: Pass, settings: &Settings, needs: MapNeeds) -> Vec<usize> {
             Switch::MoreSamples => antialias::traces_more(settings),
             Switch::SmoothMaximum => antialias::smooths_maximum(settings),
             Switch::Feedback => feedback::in_use(settings),
+            Switch::VertexLight => vertex_light::in_use(settings),
         };
         if !on {
             continue;

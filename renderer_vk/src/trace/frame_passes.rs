@@ -2,7 +2,7 @@
 
 use shaders::trace_types::{
     FilterStep, PassStep,
-    constants::{PHOTON_ROW, RAY_TILE},
+    constants::{PHOTON_ROW, RAY_TILE, VERTEX_ROW},
 };
 
 use super::pass_set::{PassSet, Pipeline};
@@ -52,6 +52,10 @@ pub struct FrameFacts {
     pub smooth_maximum: bool,
     /// Rays count the bodies that they meet.
     pub feedback: bool,
+    /// Bounces take the light of vertices.
+    pub vertex_light: bool,
+    /// Most vertices, and triangles that may have some.
+    pub vertices: [u32; 2],
 }
 
 impl FrameFacts {
@@ -73,6 +77,7 @@ impl FrameFacts {
             Switch::MoreSamples => self.more_samples,
             Switch::SmoothMaximum => self.smooth_maximum,
             Switch::Feedback => self.feedback,
+            Switch::VertexLight => self.vertex_light,
         }
     }
 
@@ -87,6 +92,8 @@ impl FrameFacts {
             Size::FogCells => self.fog_cells,
             Size::Flares => [self.flares, 1],
             Size::Photons => [PHOTON_ROW, self.photons.div_ceil(PHOTON_ROW)],
+            Size::Vertices => [VERTEX_ROW, self.vertices[0].div_ceil(VERTEX_ROW)],
+            Size::VertexTriangles => [VERTEX_ROW, self.vertices[1].div_ceil(VERTEX_ROW)],
             Size::Output => output,
             Size::OutputHalf => output.map(|n| n.div_ceil(2)),
             Size::OutputQuarter => output.map(|n| n.div_ceil(4)),

@@ -111,8 +111,9 @@ pub struct StaticGeometry {
     pub surroundings: Surroundings,
     /// Cost of the structures.
     pub cost: StructureCost,
+    /// Numbers of the first triangles: those of the world that stop rays, but for the sky; all of the world.
+    pub world_triangles: [u32; 2],
     /// Records of the structures' triangles, which shaders read by address.
-    #[cfg_attr(not(test), expect(dead_code, reason = "only kept alive"))]
     triangle_records: Buffer,
 }
 
@@ -304,7 +305,24 @@ fn layers(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Vec<StaticL
     scene.surfaces.iter().filter(is_layer).map(layer).collect()
 }
 
+impl Grouped {
+    /// See [`StaticGeometry::world_triangles`]: models and kinds are in this order.
+    fn world_triangles(&self) -> [u32; 2] {
+        let count = |last: Kind| {
+            let groups = self.groups.range(..=(0, last));
+            let counts = groups.map(|(_, group)| group.count);
+            u32::try_from(counts.sum::<usize>()).unwrap_or(0)
+        };
+        [count(Kind::Tested), count(Kind::Passed)]
+    }
+}
+
 impl StaticGeometry {
+    /// Device address of the records of all triangles.
+    pub fn triangles(&self) -> u64 {
+        self.triangle_records.address()
+    }
+
     /// Bytes of the structures and of the triangle records.
     #[cfg(test)]
     pub fn bytes(&self) -> u64 {
@@ -369,6 +387,7 @@ impl StaticGeometry {
             map_skies: MapSkies::new(scene, materials),
             mirrors: Mirrors::new(device, scene, materials)?,
             bodies: Bodies::new(device, scene, materials, &bodies)?,
+            world_triangles: grouped.world_triangles(),
             surroundings: Surroundings::default(),
             triangle_records: triangles,
         })

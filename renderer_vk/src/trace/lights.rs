@@ -521,6 +521,11 @@ impl MapLights {
         [count(self.changing.len()), count(self.pulsing.len())]
     }
 
+    /// Whether lights of the lists, or with `tree` of the tree, move or change.
+    pub(super) fn have_changing(&self, tree: bool) -> bool {
+        tree || self.lasting() != [0; 2]
+    }
+
     /// Costs of the lists, and of the trees if a frame has used them.
     pub fn cost(&self) -> LightCost {
         let trees = self.trees.get();

@@ -64,7 +64,8 @@ pub mod still;
 pub mod surroundings;
 pub mod targets;
 pub mod tracer;
-pub mod view_tracer;
+pub mod vertex_light;
+mod view_tracer;
 
 pub use look::{MapView, TraceLook};
 

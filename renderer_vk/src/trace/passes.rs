@@ -36,6 +36,10 @@ pub enum Size {
     Flares,
     /// One for each photon.
     Photons,
+    /// One for each vertex that may have light.
+    Vertices,
+    /// One for each triangle that may have vertices.
+    VertexTriangles,
     /// One for each pixel of the finished picture.
     Output,
     /// One for each 2 × 2 pixels of the finished picture.
@@ -81,6 +85,8 @@ pub enum Switch {
     MoreSamples,
     /// Rays count the bodies that they meet (`rt_hitFeedback`).
     Feedback,
+    /// Bounces take the light of vertices (`rt_bounceCache`).
+    VertexLight,
 }
 
 /// Declaration of a pass.
@@ -141,7 +147,7 @@ macro_rules! passes {
         /// Declarations, in the order of [`Pass`].
         pub static TABLE: &[Row] = {
             #[allow(clippy::enum_glob_use)] // rows name many of them
-            use {Resource::*, Shader::{Compute, Rays}, Switch::{Adaptive, BlueNoise, Bounces, Caustics, Feedback, Gloss, LightTree, LitFog, MapFog, Roulette, SharedEyes, Timed}};
+            use {Resource::*, Shader::{Compute, Rays}, Switch::{Adaptive, BlueNoise, Bounces, Caustics, Feedback, Gloss, LightTree, LitFog, MapFog, Roulette, SharedEyes, Timed, VertexLight}};
             &[$(Row { $($field: $value,)* ..Row::of(concat!($($about),+), $name, $shader, Size::$size) }),+]
         };
     };
@@ -261,6 +267,30 @@ passes! {
         writes: &[BounceLights],
         counter: Some(t::COUNT_MIRRORS),
     }
+    /// Makes the vertices of the map's triangles, and splits triangles where the light of neighbours differs (`rt_bounceCache`).
+    VertexSplit = "trace_vertices", Compute(&shaders::TRACE_VERTEX_SPLIT_COMP), VertexTriangles {
+        reads: &[Scene],
+        may_read: &[LitVertices],
+        writes: &[VertexGrids],
+    }
+    /// Tests which cells of vertices no wall crosses.
+    VertexTest = "trace_vertices", Rays(&shaders::TRACE_VERTEX_WRITE), Vertices {
+        shares: Some(Pass::VertexWrite),
+        reads: &[Scene, VertexGrids],
+        writes: &[VertexCells],
+    }
+    /// Samples the light at these vertices.
+    VertexGather = "trace_vertices", Rays(&shaders::TRACE_VERTEX_GATHER), Vertices {
+        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::lights::LIGHT_TREE, LightTree)],
+        reads: &[Scene, Lights, VertexGrids, VertexCells],
+        may_read: &[LitVertices],
+        writes: &[VertexSums],
+    }
+    /// Writes it for bounces.
+    VertexWrite = "trace_vertices", Rays(&shaders::TRACE_VERTEX_WRITE), Vertices {
+        reads: &[Scene, VertexGrids, VertexCells, VertexSums],
+        writes: &[LitVertices],
+    }
     /// Selects the cells that gather bounced light (`rt_bounceAdaptive`).
     BounceSelect = "trace_bounce_select", Compute(&shaders::TRACE_BOUNCE_SELECT_COMP), Cells {
         switches: &[(ids::subsample::SHARED_EYES, SharedEyes)],
@@ -284,17 +314,17 @@ passes! {
     }
     /// Shades what they hit, and samples a light for it.
     BounceShade = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
-        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive), (ids::lights::LIGHT_TREE, LightTree)],
+        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive), (ids::lights::LIGHT_TREE, LightTree), (ids::vertex_light::VERTEX_LIGHT, VertexLight)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
-        may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells, SelectedCells],
+        may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells, SelectedCells, LitVertices],
         writes: &[BounceLights, GlossSurfaces],
     }
     /// The same of the last bounce, after which no path goes on.
     BounceShadeLast = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
         constants: &[(ids::bounce::LAST_BOUNCE, 1)],
-        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive), (ids::lights::LIGHT_TREE, LightTree), (ids::bounce_hits::AMBIENT, Switch::Ambient)],
+        switches: &[(ids::bounce::HAS_FOG, MapFog), (ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive), (ids::lights::LIGHT_TREE, LightTree), (ids::bounce_hits::AMBIENT, Switch::Ambient), (ids::vertex_light::VERTEX_LIGHT, VertexLight)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceHits],
-        may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells, SelectedCells],
+        may_read: &[GradientPixels, BounceLights, GlossSurfaces, PhotonCells, SelectedCells, LitVertices],
         writes: &[BounceLights, GlossSurfaces],
     }
     /// Shadow rays to those lights; the last writes the light of the paths, of one of both kinds.

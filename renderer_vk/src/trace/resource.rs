@@ -37,6 +37,14 @@ pub enum Resource {
     Reservoirs,
     /// Direct light without albedo; the denoiser leaves the sum of all filtered light here.
     DirectLight,
+    /// The vertices of the map's triangles, in the frame that computes their light.
+    VertexGrids,
+    /// Whether walls cross the cells between them.
+    VertexCells,
+    /// Sums of the samples of their light.
+    VertexSums,
+    /// Their light.
+    LitVertices,
     /// Cells of 2 × 2 pixels that gather bounced light.
     SelectedCells,
     /// What the rays of a bounce hit.

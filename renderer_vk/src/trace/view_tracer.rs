@@ -31,6 +31,7 @@ use super::reservoirs::Reservoirs;
 use super::screen::LastScreen;
 use super::specular::SpecularTable;
 use super::targets::{OwnImages, Targets};
+use super::vertex_light::VertexLight;
 use crate::api::DynamicLight;
 use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
@@ -86,6 +87,7 @@ pub struct ViewTracer {
     screen: LastScreen,
     pub(super) photons: Photons,
     reservoirs: Reservoirs,
+    vertex_light: VertexLight,
     counters: RayCounters,
     pixel_times: PixelTimes,
     specular_table: SpecularTable,
@@ -145,6 +147,7 @@ impl ViewTracer {
             screen: LastScreen::default(),
             photons: Photons::default(),
             reservoirs: Reservoirs::default(),
+            vertex_light: VertexLight::default(),
             counters: RayCounters::default(),
             pixel_times: PixelTimes::default(),
             specular_table: SpecularTable::default(),
@@ -239,6 +242,7 @@ impl ViewTracer {
     /// Discards accumulated frames and light samples: lights have changed.
     pub fn forget_accumulated(&mut self) {
         self.accumulated = (0, 0);
+        self.vertex_light.forget();
         self.reservoirs.forget();
     }
 
@@ -353,6 +357,8 @@ impl ViewTracer {
         let caustics = has_bodies && is_lit(settings) && photons::in_use(settings);
         self.photons.prepare(&self.device, caustics)?;
         (self.screen).prepare(&self.device, settings, size, goes_on)?;
+        let lit = map.map(|m| (m.geometry, m.lights));
+        (self.vertex_light).prepare(&self.device, settings, lit)?;
         let accumulated = self.accumulated_before(scene, materials, settings);
         let matches = self.motion.matches(scene);
         (self.feedback).begin(rec, scene, settings, size[0] * size[1], &matches)?;
@@ -429,6 +435,7 @@ impl ViewTracer {
         } else {
             light_directly(passes, settings, params)?;
         }
+        self.vertex_light.record(passes)?;
         if facts.bounces {
             indirect::record(passes, &params.transport, settings.rt_samples)?;
         } else {
@@ -486,6 +493,8 @@ impl ViewTracer {
             more_samples: antialias::traces_more(settings),
             smooth_maximum: antialias::smooths_maximum(settings),
             feedback: self.feedback.is_on(),
+            vertex_light: self.vertex_light.is_on(),
+            vertices: self.vertex_light.sizes(),
         }
     }
 

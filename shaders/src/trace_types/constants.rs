@@ -23,6 +23,26 @@ pub const MIRROR_TRANSLUCENT: u32 = 2;
 /// Photons in a row of their launch.
 pub const PHOTON_ROW: u32 = 512;
 
+/// Bit of `LightGrid::segments`: the other side has vertices of its own behind those of the first.
+pub const GRID_TWO_SIDED: u32 = 0x10000;
+/// Mask of the number of segments.
+pub const GRID_SEGMENTS: u32 = 0xFFFF;
+/// Most segments of an edge.
+pub const GRID_MOST: u32 = 128;
+/// Vertices, and triangles, in a row of a launch.
+pub const VERTEX_ROW: u32 = 1024;
+
+/// Bits of `VertexSum::cells`: no wall crosses the cell towards the opposite edge; that behind it.
+pub const CELL_UP: u32 = 1;
+pub const CELL_DOWN: u32 = 2;
+
+/// Bits of `PassStep::part` of the passes of vertices: direct light alone, with the random numbers of the triangle; bounced
+/// light replaces that of the last sweep; a quarter of the samples; the edges of cells are tested by rays.
+pub const VERTICES_DIRECT: u32 = 1;
+pub const VERTICES_RESTART: u32 = 2;
+pub const VERTICES_QUICK: u32 = 4;
+pub const VERTICES_TEST: u32 = 8;
+
 /// Levels of bloom, each of half the size of the one before.
 pub const BLOOM_LEVELS: u32 = 5;
 
@@ -229,6 +249,9 @@ pub const STREAM_SPECULAR: u32 = 4000;
 pub const STREAM_PHOTONS: u32 = 4001;
 /// Reuse of the light samples of neighbours.
 pub const STREAM_REUSE: u32 = 4002;
+
+/// Light at vertices, by vertex or triangle instead of by pixel.
+pub const STREAM_VERTICES: u32 = 4003;
 
 /// `PassStep::part` of a bounce: bit of the paths that start at rough surfaces; number of the first bit of the path's
 /// number; below it the pixel of the cell.

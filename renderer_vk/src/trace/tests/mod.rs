@@ -35,4 +35,5 @@ mod sides;
 mod skies;
 mod structures;
 mod texture_filter;
+mod vertex_light;
 mod views;

@@ -71,6 +71,7 @@ impl ViewTracer {
                 .map(|m| self.photons.view(&m.geometry.bodies, accumulated))
                 .unwrap_or_default(),
             reservoirs: self.reservoirs.view(lights.lasting()),
+            vertex_light: self.vertex_light.view(),
             motion: prepared.motion,
             denoise: (self.denoiser).view(
                 self.frame.wrapping_sub(1),
