@@ -117,12 +117,6 @@ pub struct ViewTracer {
     joining: u32,
 }
 
-/// Time constants of adaptation to a brighter and to a darker view, seconds: after this time 1/e of the difference is
-/// left. Values of cones and rods (Krawczyk, Myszkowski and Seidel, Perceptual Effects in Real-time Tone Mapping, SCCG
-/// 2005, section 3.2).
-const LIGHT_ADAPTATION: f32 = 0.1;
-const DARK_ADAPTATION: f32 = 0.4;
-
 /// Number of frames that a given mean counts as: a frame of radiance 60000, the largest, changes it by less than 1e-4.
 const WHOLE_WEIGHT: u32 = 1 << 30;
 
@@ -496,21 +490,6 @@ impl ViewTracer {
             vertex_light: self.vertex_light.is_on(),
             vertices: self.vertex_light.sizes(),
         }
-    }
-
-    /// Weight of the new value in automatic exposure in this frame, for an adaptation time of `seconds`.
-    fn exposure_blend(&self, view: &TracedScene, settings: &Settings, seconds: f32) -> f32 {
-        // in reference mode frames must not depend on earlier ones: exposure adapts at once
-        if settings.rt_accumulate || !self.exposure_started {
-            return 1.0;
-        }
-        let passed = view.time - self.last_time;
-        let passed = if passed > 0.0 {
-            passed.min(1.0)
-        } else {
-            1.0 / 60.0
-        };
-        1.0 - (-passed / seconds).exp()
     }
 
     /// Number of frames in the accumulated mean before this one; 0 if any visible content has changed.

@@ -9,7 +9,7 @@ use shaders::trace_types::{
 use shaders::types::{SunDisc, constants::NO_TEXTURE};
 
 use super::super::indirect::{self, is_subsampled};
-use super::{DARK_ADAPTATION, LIGHT_ADAPTATION, TracedMap, TracedView, ViewTracer};
+use super::{TracedMap, TracedView, ViewTracer};
 use crate::gpu::{Error, Image, Recorder};
 use crate::raster::{FlareTest, WIDE_FORMAT};
 use crate::scene::{SUN_SIZE, TracedScene, View, perpendicular};
@@ -40,6 +40,12 @@ pub(super) struct Prepared<'a> {
     /// Parameters of the passes after tracing, and the ray counters.
     pub post: PostView,
 }
+
+/// Time constants of adaptation to a brighter and to a darker view, seconds: after this time 1/e of the difference is
+/// left. Values of cones and rods (Krawczyk, Myszkowski and Seidel, Perceptual Effects in Real-time Tone Mapping, SCCG
+/// 2005, section 3.2).
+const LIGHT_ADAPTATION: f32 = 0.1;
+const DARK_ADAPTATION: f32 = 0.4;
 
 impl ViewTracer {
     /// All parameters of a view's passes.
@@ -115,6 +121,21 @@ impl ViewTracer {
         } else {
             f32::MAX
         }
+    }
+
+    /// Weight of the new value in automatic exposure in this frame, for an adaptation time of `seconds`.
+    fn exposure_blend(&self, view: &TracedScene, settings: &Settings, seconds: f32) -> f32 {
+        // in reference mode frames must not depend on earlier ones: exposure adapts at once
+        if settings.rt_accumulate || !self.exposure_started {
+            return 1.0;
+        }
+        let passed = view.time - self.last_time;
+        let passed = if passed > 0.0 {
+            passed.min(1.0)
+        } else {
+            1.0 / 60.0
+        };
+        1.0 - (-passed / seconds).exp()
     }
 
     /// Boxes that rays are tested against: around translucent layers, geometry behind skies, and surfaces that filter
