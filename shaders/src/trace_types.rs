@@ -25,7 +25,8 @@ pub use lights::{
 };
 pub use photons::{BodyTriangle, Photon, PhotonCell, PhotonView};
 pub use structures::{
-    BvhInstance, BvhNode, BvhTriangle, FilterStep, GeometryRecord, GridRecord, HybridStep, PassStep,
+    BvhInstance, BvhNode, BvhTriangle, FilterStep, FirstHitsStep, GeometryRecord, GridRecord,
+    HybridStep, PassStep,
 };
 pub use surroundings::{FlareView, FogView, MirrorPlane, PortalRecord, SkyRecord, TransportView};
 pub use vertex_light::{LightGrid, VertexLightView, VertexSum};

@@ -23,6 +23,7 @@ const COMPARED: &[&str] = &[
     "rt_taaRays",
     "rt_taaMaximum",
     "rt_hitFeedback",
+    "rt_firstHits",
 ];
 
 /// A row of a table. The help of variables without effect ends with a sentence that their table states once.

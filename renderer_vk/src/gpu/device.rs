@@ -307,6 +307,15 @@ impl Device {
         }
     }
 
+    /// Whether the device can render to images of a colour or depth format.
+    pub fn draws_to(&self, format: Format) -> bool {
+        let needed = match format.aspect() == vk::ImageAspectFlags::COLOR {
+            true => vk::FormatFeatureFlags::COLOR_ATTACHMENT,
+            false => vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT,
+        };
+        self.0.features(format).contains(needed)
+    }
+
     /// Whether the device can render to images of a colour or depth format with this number of samples.
     pub fn supports_samples(&self, format: Format, samples: u32) -> bool {
         let usage = if format.aspect() == vk::ImageAspectFlags::COLOR {

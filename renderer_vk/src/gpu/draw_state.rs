@@ -48,6 +48,8 @@ pub enum DepthTest {
     LessEqual,
     /// Exactly the stored depth.
     Equal,
+    /// At least the stored depth.
+    GreaterEqual,
 }
 
 impl DepthTest {
@@ -56,6 +58,7 @@ impl DepthTest {
             Self::Always => vk::CompareOp::ALWAYS,
             Self::LessEqual => vk::CompareOp::LESS_OR_EQUAL,
             Self::Equal => vk::CompareOp::EQUAL,
+            Self::GreaterEqual => vk::CompareOp::GREATER_OR_EQUAL,
         }
     }
 }

@@ -78,6 +78,19 @@ pub struct AccelMemory {
     pub top: u64,
 }
 
+/// Triangles of one geometry record, for [`FirstHits`](super::first_hits::FirstHits).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DrawnGeometry {
+    /// Index of the record.
+    pub record: u32,
+    /// Number of triangles.
+    pub triangles: u32,
+    /// `MASK_*` bits of the rays that meet it.
+    pub mask: u8,
+    /// Kind of its triangles.
+    pub kind: Kind,
+}
+
 /// Source of a placement, before the structures are built.
 enum Part<'a> {
     /// A structure of the map.
@@ -107,6 +120,8 @@ struct Placements<'a> {
     /// One record per geometry of a structure; a hit's record index is the structure's first plus the geometry's
     /// number.
     records: Vec<GeometryRecord>,
+    /// The same as draws.
+    drawn: Vec<DrawnGeometry>,
 }
 
 impl<'a> Placements<'a> {
@@ -116,7 +131,7 @@ impl<'a> Placements<'a> {
         (axis, origin): (Mat3, Vec3),
         mask: u8,
         kind: Kind,
-        records: impl IntoIterator<Item = GeometryRecord>,
+        records: impl IntoIterator<Item = (GeometryRecord, Kind, u32)>,
     ) {
         self.placed.push(Placement {
             part,
@@ -127,7 +142,15 @@ impl<'a> Placements<'a> {
             kind,
             of_model: false,
         });
-        self.records.extend(records);
+        for (record, kind, triangles) in records {
+            self.drawn.push(DrawnGeometry {
+                record: u32::try_from(self.records.len()).unwrap_or(u32::MAX),
+                triangles,
+                mask,
+                kind,
+            });
+            self.records.push(record);
+        }
     }
 
     /// Adds the world and the brush models of a view.
@@ -146,11 +169,14 @@ impl<'a> Placements<'a> {
                 let Some(first) = slice::get(&blas.parts, 0) else {
                     continue;
                 };
-                let record = |part: &StaticPart| GeometryRecord {
-                    triangles: part.triangles,
-                    vertices: geometry.vertices,
-                    instance: index,
-                    kind: part.kind.index(),
+                let record = |part: &StaticPart| {
+                    let record = GeometryRecord {
+                        triangles: part.triangles,
+                        vertices: geometry.vertices,
+                        instance: index,
+                        kind: part.kind.index(),
+                    };
+                    (record, part.kind, part.count)
                 };
                 let mask = |mask, part: &StaticPart| mask | Seen::Always.mask(part.kind);
                 let mask = blas.parts.iter().fold(0, mask);
@@ -202,6 +228,8 @@ pub struct Accel {
     has_models: bool,
     /// Sums over frames.
     cost: MovingCost,
+    /// The geometry records of the last view.
+    drawn: Vec<DrawnGeometry>,
 }
 
 impl Accel {
@@ -225,7 +253,13 @@ impl Accel {
             own_bytes: [0; 2],
             has_models: false,
             cost: MovingCost::default(),
+            drawn: Vec::new(),
         }
+    }
+
+    /// The geometry of the last view, a draw for each of its records.
+    pub fn drawn(&self) -> &[DrawnGeometry] {
+        &self.drawn
     }
 
     /// Makes empty storage, which has a second top level of the models alone.
@@ -335,7 +369,8 @@ impl Accel {
             let mask = part.seen.mask(part.kind);
             let kept = Part::Kept(index, prepared);
             let place = (axes(instance), instance.origin);
-            placements.add(kept, place, mask, part.kind, [record]);
+            let records = [(record, part.kind, prepared.count)];
+            placements.add(kept, place, mask, part.kind, records);
             if let Some(placed) = placements.placed.last_mut() {
                 placed.of_model = part.of_model;
             }
@@ -352,9 +387,16 @@ impl Accel {
             };
             let mask = slot.seen.mask(slot.kind);
             let place = (Mat3::IDENTITY, Vec3::ZERO);
-            placements.add(Part::Slot(index), place, mask, slot.kind, [record]);
+            let count = u32::try_from(slot.triangles.len()).unwrap_or(u32::MAX);
+            let records = [(record, slot.kind, count)];
+            placements.add(Part::Slot(index), place, mask, slot.kind, records);
         }
-        let Placements { placed, records } = placements;
+        let Placements {
+            placed,
+            records,
+            drawn,
+        } = placements;
+        self.drawn = drawn;
         output.geometries = rec.arena().push(&records)?;
         if self.driver.is_some() {
             let serial = geometry.map_or(0, |g| g.serial);

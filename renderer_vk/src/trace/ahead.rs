@@ -1,5 +1,6 @@
 //! Which passes are compiled before a frame runs them, so that their pipelines are compiled at once and not one by one.
 
+use super::first_hits;
 use super::light_selection::{reuses_samples, samples_one_light};
 use super::pass_set::PassSet;
 use super::passes::{Pass, Switch};
@@ -12,6 +13,7 @@ use crate::settings::{Anaglyph, DenoiserChoice, Settings};
 /// Passes that the settings decide about, or that every frame runs, the slowest to compile first. Others are
 /// compiled when a frame first runs them.
 const AHEAD: [Pass; 45] = [
+const AHEAD: [Pass; 42] = [
     Pass::Primary,
     Pass::VertexGather,
     Pass::BounceShadeLast,
@@ -28,6 +30,7 @@ const AHEAD: [Pass; 45] = [
     Pass::MirrorLight,
     Pass::SpecularLight,
     Pass::PrimaryRays,
+    Pass::FirstHits,
     Pass::SampleLights,
     Pass::WaveletFirst,
     Pass::WaveletSecond,
@@ -78,6 +81,7 @@ fn is_chosen(pass: Pass, settings: &Settings, needs: MapNeeds) -> bool {
             settings.rt_bounces > 0 || gloss
         }
         Pass::ScreenSurface | Pass::ScreenMarch | Pass::ScreenLight => screen::in_use(settings),
+        Pass::FirstHits => first_hits::in_use(settings),
         Pass::BounceSelect => indirect::is_adaptive(settings),
         Pass::VertexSplit | Pass::VertexGather | Pass::VertexWrite => {
             vertex_light::in_use(settings)

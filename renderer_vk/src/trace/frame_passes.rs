@@ -140,6 +140,11 @@ impl<'a> FramePasses<'a> {
         }
     }
 
+    /// Device address of the `TraceView`.
+    pub fn view(&self) -> u64 {
+        self.view
+    }
+
     /// Records a pass.
     ///
     /// # Errors

@@ -37,6 +37,8 @@ pub struct StaticPart {
     pub kind: Kind,
     /// Device address of the `Triangle`s.
     pub triangles: u64,
+    /// Number of them.
+    pub count: u32,
 }
 
 /// One bottom-level structure of the map.
@@ -89,6 +91,8 @@ pub struct StaticGeometry {
     pub structures: Vec<StaticBlas>,
     /// Device address of the vertices that their triangles index.
     pub vertices: u64,
+    /// Positions of these vertices in the structures.
+    pub positions: Vec<Vec3>,
     /// Device address of the vertices' `MappedVertex`; 0: they have none.
     pub mapped_vertices: u64,
     /// Sky records, indexed by the lightmap field of sky triangles.
@@ -376,6 +380,7 @@ impl StaticGeometry {
             structures,
             cost,
             vertices: scene.vertex_address,
+            positions,
             mapped_vertices: scene.mapped_address,
             skies: Buffer::with_data(device, "trace skies", storage, &grouped.skies)?,
             fogs: Buffer::with_data(device, "trace fogs", storage, scene.fogs)?,
@@ -417,6 +422,7 @@ fn driver_structures(
         members.push(StaticPart {
             kind: *kind,
             triangles: triangles.address() + (group.first * size_of::<Triangle>()) as u64,
+            count: u32::try_from(group.count).unwrap_or(u32::MAX),
         });
         geometries.push(BlasGeometry {
             vertex_address: position_buffer.address(),
@@ -510,6 +516,7 @@ fn own_structures(
         let part = |(kind, group): &(Kind, &Group)| StaticPart {
             kind: *kind,
             triangles: triangles.address() + (group.first * size_of::<Triangle>()) as u64,
+            count: u32::try_from(group.count).unwrap_or(u32::MAX),
         };
         structures.push(StaticBlas {
             model,

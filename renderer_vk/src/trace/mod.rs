@@ -23,6 +23,7 @@ pub mod cutout;
 pub mod denoise;
 mod doubled;
 mod feedback;
+mod first_hits;
 pub mod fog;
 mod fog_light;
 mod frame_lights;

@@ -161,6 +161,12 @@ passes! {
         writes: &[PrimaryHits],
         counter: Some(t::COUNT_PRIMARY_RAYS),
     }
+    /// The same from what the rasterizer has drawn (`rt_firstHits`).
+    FirstHits = "trace_first_hits", Compute(&shaders::TRACE_FIRST_HITS_COMP), Traced {
+        switches: &[(ids::clock::TIMED, Timed)],
+        reads: &[Scene, DrawnHits],
+        writes: &[PrimaryHits],
+    }
     /// `Primary` compiled without rays: finishes the many pixels that show the surface of their first hit.
     PrimarySimple = "trace_primary_simple", Compute(&shaders::TRACE_PRIMARY_RGEN_NO_RAYS), Traced {
         switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed)],

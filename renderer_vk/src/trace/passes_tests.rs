@@ -73,7 +73,12 @@ fn the_table_of_passes_in_architecture_is_this_one() {
 #[test]
 fn everything_read_is_written_by_some_pass() {
     let written: Vec<Resource> = (TABLE.iter().flat_map(|row| row.writes.iter().copied()))
-        .chain([Resource::Scene, Resource::Lights, Resource::HybridSurfaces])
+        .chain([
+            Resource::Scene,
+            Resource::Lights,
+            Resource::DrawnHits,
+            Resource::HybridSurfaces,
+        ])
         .collect();
     for row in TABLE {
         for read in row.reads.iter().chain(row.may_read) {

@@ -7,6 +7,8 @@ pub enum Resource {
     Scene,
     /// Light lists, lights and suns; ready before the passes.
     Lights,
+    /// Geometry and triangle of each pixel; drawn before the passes.
+    DrawnHits,
     /// First hits of the camera's rays.
     PrimaryHits,
     /// Motion and view distance of the surface that a pixel shows.

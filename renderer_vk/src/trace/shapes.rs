@@ -50,6 +50,7 @@ struct Skin {
     seen: u64,
     /// Version of the triangles that it was made for.
     version: u64,
+    count: u32,
     triangles: Buffer,
 }
 
@@ -71,6 +72,10 @@ pub struct Use {
     pub body: Option<u32>,
     /// Its structure must have this frame's shape.
     pub refit: bool,
+    /// Number of them.
+    pub count: u32,
+    /// Index of an animated part's pose.
+    pose: usize,
 }
 
 /// Bytes of the structures, by use.
@@ -185,9 +190,11 @@ impl Shapes {
             )
         };
         let skin = slice::part(&parts.skins, part.members.clone());
+        let (triangles, count) = self.prepare_skin(skin, &meshes, version)?;
         Ok(Prepared {
             vertices: address,
-            triangles: self.prepare_skin(skin, &meshes, version)?,
+            triangles,
+            count,
             pose,
         })
     }
@@ -327,17 +334,23 @@ impl Shapes {
         key: &[SkinMesh],
         meshes: &[MeshPart<'_>],
         version: u64,
-    ) -> Result<u64, Error> {
+    ) -> Result<(u64, u32), Error> {
+        let found = |skin: &Skin| (skin.triangles.address(), skin.count);
         if let Some(skin) = self.skins.get_mut(key)
             && skin.version == version
         {
             skin.seen = self.frame;
-            return Ok(skin.triangles.address());
+            return Ok(found(skin));
         }
         let mut triangles = Vec::new();
+        let mut vertices = 0;
         for (mesh, skin) in meshes.iter().zip(key) {
+            vertices += mesh.mesh.vertices.len();
+            let end = mesh.offset as usize + mesh.mesh.vertices.len();
+            let exists = |indices: &[u32; 3]| indices.iter().all(|&i| (i as usize) < end);
             triangles.extend(mesh.triangles().map(|indices| Triangle {
-                indices,
+                // no ray hits a triangle without its vertices, but it may be drawn
+                indices: if exists(&indices) { indices } else { [0; 3] },
                 material: skin.material,
                 // the geometry record holds the instance
                 instance: 0,
@@ -348,15 +361,17 @@ impl Shapes {
         }
         let storage = BufferUsage::STORAGE;
         let buffer = Buffer::with_data(&self.device, "trace skin", storage, &triangles)?;
-        let address = buffer.address();
-        self.skins.insert(
-            key.into(),
-            Skin {
-                seen: self.frame,
-                version,
-                triangles: buffer,
+        let skin = Skin {
+            seen: self.frame,
+            version,
+            count: match vertices {
+                0 => 0,
+                _ => u32::try_from(triangles.len()).unwrap_or(u32::MAX),
             },
-        );
-        Ok(address)
+            triangles: buffer,
+        };
+        let made = found(&skin);
+        self.skins.insert(key.into(), skin);
+        Ok(made)
     }
 }

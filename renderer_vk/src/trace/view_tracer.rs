@@ -15,6 +15,8 @@ use super::blue_noise::BlueNoise;
 use super::counters::RayCounters;
 use super::denoise::{self, Denoiser, OtherEye};
 use super::feedback::Feedback;
+use super::denoise::{self, Denoiser};
+use super::first_hits::FirstHits;
 use super::fog::LitFog;
 use super::frame_passes::{FrameFacts, FramePasses};
 use super::geometry::StaticGeometry;
@@ -77,6 +79,7 @@ pub struct ViewTracer {
     pub(super) device: Device,
     pub(super) accel: Accel,
     passes: Arc<PassSet>,
+    first_hits: FirstHits,
     fog: LitFog,
     pub(super) denoiser: Denoiser,
     pub(super) antialias: Antialias,
@@ -131,6 +134,7 @@ impl ViewTracer {
             device: device.clone(),
             passes: Arc::clone(passes),
             accel: Accel::new(device, passes.tracer()),
+            first_hits: FirstHits::default(),
             fog: LitFog::new(device),
             denoiser: Denoiser::new(device)?,
             antialias: Antialias::new(device)?,
@@ -360,6 +364,10 @@ impl ViewTracer {
         let (accel, feedback) = (&mut self.accel, &mut self.feedback);
         let accel = accel.record_fed(rec, scene, map_geometry, materials, feedback)?;
         let feedback = self.feedback.count(rec)?;
+        let geometry = map.map(|m| m.geometry);
+        (self.first_hits).prepare(&self.device, settings, size, geometry)?;
+        let accumulated = self.accumulated_before(scene, materials, settings);
+        let accel = self.accel.record(rec, scene, geometry, materials)?;
         let portals: Vec<PortalRecord> = if settings.hides_portals() {
             Vec::new()
         } else {
@@ -412,7 +420,12 @@ impl ViewTracer {
         let address = rec.arena().push(std::slice::from_ref(params))?;
         let facts = self.facts(targets, settings, output, params);
         let passes = &mut FramePasses::new(&self.passes, rec, address, facts);
-        passes.run(Pass::PrimaryRays)?;
+        if self.first_hits.is_on() {
+            let drawn = self.accel.drawn();
+            (self.first_hits).record(passes, drawn, params)?;
+        } else {
+            passes.run(Pass::PrimaryRays)?;
+        }
         passes.run(Pass::PrimarySimple)?;
         passes.run(Pass::Primary)?;
         if !settings.rt_accumulate {

@@ -45,6 +45,27 @@ pub struct PassStep {
     pub part: u32,
 }
 
+/// Push constants of the draws of first hits, and of the pass that reads them (`rt_firstHits`).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct FirstHitsStep {
+    /// The `TraceView`.
+    pub view: u64,
+    /// Address of the map's vertices; geometry that has them is drawn at `positions`.
+    pub map_vertices: u64,
+    /// Positions of the map's vertices in its acceleration structures.
+    pub positions: u64,
+    /// A place relative to the eye, times the first two, is a place of the picture from -1 to 1 times the depth, which is
+    /// the product with the third.
+    pub to_picture: [Vec3; 3],
+    /// Bindless index of the image of geometries and triangles.
+    pub image: u32,
+    /// 1: the draws are of first-person geometry.
+    pub first_person: u32,
+    /// Makes the size a multiple of 8 bytes.
+    pub padding: u32,
+}
+
 /// Push constants of a pass of the hybrid look.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]

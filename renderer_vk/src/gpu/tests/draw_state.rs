@@ -23,7 +23,12 @@ fn states() -> Vec<State> {
         Some((BlendFactor::One, BlendFactor::One)),
         Some((BlendFactor::DstColor, BlendFactor::Zero)),
     ] {
-        for test in [DepthTest::Always, DepthTest::LessEqual, DepthTest::Equal] {
+        for test in [
+            DepthTest::Always,
+            DepthTest::LessEqual,
+            DepthTest::Equal,
+            DepthTest::GreaterEqual,
+        ] {
             for write in [false, true] {
                 for cull in [Cull::None, Cull::Front, Cull::Back] {
                     all.push(State {
@@ -49,6 +54,7 @@ fn expected(state: State, z: f32) -> [u8; 3] {
         DepthTest::Always => true,
         DepthTest::LessEqual => z <= 0.5,
         DepthTest::Equal => z == 0.5,
+        DepthTest::GreaterEqual => z >= 0.5,
     };
     let passes = near_enough && state.cull != Cull::Back;
     let red = match state.blend {

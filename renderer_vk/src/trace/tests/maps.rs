@@ -15,7 +15,7 @@ use crate::gpu::ColorMask;
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
 use crate::raster::FlareTest;
 use crate::scene::{GatherInput, Scene};
-use crate::settings::{Look, Settings, TracerChoice};
+use crate::settings::{Look, MapLightChoice, Settings, TracerChoice};
 use crate::test_support::openarena;
 use crate::trace::ahead::compile_ahead;
 use crate::trace::pass_set::PassSet;
@@ -131,8 +131,10 @@ impl Game {
             self.gpu.ring.end(rec).expect("submitted");
         }
         device.wait_idle().expect("done");
+        // those of the draws of first hits are compiled by the first frame that needs them
+        let draws = if settings.rt_first_hits { 2 } else { 0 };
         let compiled = device.compiled_pipelines();
-        assert_eq!(compiled, ahead, "passes that a frame compiled");
+        assert_eq!(compiled, ahead + draws, "passes that a frame compiled");
         (device.read_image(&target).expect("read"), look)
     }
 }
@@ -261,4 +263,38 @@ fn tracers_agree_on_maps() {
         }
     }
     game.gpu.check_messages();
+}
+
+/// Share of pixels that differ from rays by more than a step of 4 of 255: those at edges.
+#[test]
+fn first_hits_of_a_map_are_those_of_rays() {
+    for tracer in [Tracer::Pipeline, Tracer::Query, Tracer::Compute] {
+        let Some(mut game) = Game::new(tracer) else {
+            return;
+        };
+        let passes = Arc::clone(&game.gpu.passes);
+        let [traced, drawn] = [false, true].map(|rt_first_hits| {
+            let settings = Settings {
+                rt: Look::Traced,
+                rt_accumulate: true,
+                rt_antialiasing: false,
+                rt_auto_exposure: false,
+                rt_bounces: 0,
+                rt_lights: MapLightChoice::Prior,
+                rt_first_hits,
+                ..Settings::full_size()
+            };
+            let (mut assets, mut world) = game.load("oa_dm1.bsp", &settings);
+            world.light_by(settings.rt_lights, &mut assets, None);
+            game.draw((&mut assets, &world), &passes, &settings, SIZE, 1)
+                .0
+        });
+        let pairs = traced.chunks_exact(4).zip(drawn.chunks_exact(4));
+        let differs = |(a, b): &(&[u8], &[u8])| a.iter().zip(*b).any(|(a, b)| a.abs_diff(*b) > 4);
+        let count = pairs.filter(differs).count();
+        let pixels = traced.len() / 4;
+        println!("{tracer:?}: {count} of {pixels} differ");
+        assert!(count < pixels / 1000, "{tracer:?}: {count}");
+        game.gpu.check_messages();
+    }
 }

@@ -14,6 +14,7 @@ mod dielectrics;
 mod eyes;
 mod feedback;
 mod fewer_rays;
+mod first_hits;
 mod fog;
 mod gradients;
 mod grids;
