@@ -179,6 +179,7 @@ settings! { variables {
     rt_dof: bool = "rt_dof", "0", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "1 gives the camera a lens: what is out of focus is blurred.";
     rt_aperture: f32 = "rt_aperture", "4", ARCHIVE, kept(0.0, 256.0), Frame, Restarts, "Diameter of the lens of rt_dof in units.";
     rt_focal_length: f32 = "rt_focallength", "256", ARCHIVE, kept(1.0, 65536.0), Frame, Restarts, "Distance in units that is sharp with rt_dof.";
+    rt_cutouts: u32 = "rt_cutouts", "0", ARCHIVE, kept(0.0, 3.0), Frame, Restarts, "What rays of bounces meet at surfaces with holes: 0 their holes, 1 none, 2 by chance none or no surface, 3 holes of a simple pattern.";
     rt_first_hits: bool = "rt_firstHits", "0", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "1 finds the first surface of each pixel by the rasterizer in place of rays; not with rt_dof, nor with smooth edges of rt_accumulate.";
     rt_denoiser: DenoiserChoice = "rt_denoiser", "1", ARCHIVE, kept(0.0, 2.0), Frame, GoesOn, "Filter for traced light: 0 none, 1 A-SVGF, 2 a cheaper sparse filter.";
     rt_taa: bool = "rt_taa", "1", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 smooths edges over time.";

@@ -70,8 +70,52 @@ Hit layers_take(inout LayerList list, inout LayerOrder order) {
 // Least distance of layers behind `last`: a layer lies at its key or up to a bias behind it.
 float layer_start(LayerOrder last) { return max(last.key - 0.01, 0.0); }
 
+// 1: rays of scattered light may meet cut-outs without a test of their alpha (`rt_cutouts`).
+layout(constant_id = 13) const uint CUT_OUTS = 0;
+
+// How the current ray meets cut-outs: CUT_OUTS_*, of which CUT_OUTS_SKIPPED takes those of known coverage as solid; or
+// CUT_OUTS_OPEN: it passes these.
+uint ray_cut_outs = CUT_OUTS_TESTED;
+const uint CUT_OUTS_OPEN = 4;
+
+// The cut-out that a triangle is part of; coverage 0: it is none of the map's, or its coverage is unknown.
+CutOut cut_out_of(Triangle triangle) {
+    if ((triangle.flags & (TRIANGLE_STATIC | TRIANGLE_ONE_SIDED)) != TRIANGLE_STATIC || VIEW.transport.cut_outs == 0) return CutOut(vec3(0.0), 0.0, vec3(0.0));
+    return CutOuts(VIEW.transport.cut_outs).at[triangle.instance];
+}
+
+// Squares of the mask for one repetition of the texture coordinates, along each axis.
+const float MASK_SQUARES = 8.0;
+
+// A mask in place of the image: each square has a square hole in its middle, of its area times 1 - coverage (an
+// inexpensive mask for rays of bounces: Deferred Hybrid Path Tracing, section 26.3.3; the pattern is ours).
+bool mask_is_solid(vec2 st, float coverage) {
+    vec2 place = abs(2.0 * fract(st * MASK_SQUARES) - 1.0);
+    return max(place.x, place.y) >= sqrt(1.0 - coverage);
+}
+
+// Whether the ray needs no alpha test at a hit; `stopped`: it ends there.
+bool meets_untested(Hit hit, out bool stopped) {
+    stopped = true;
+    GeometryRecord record = Geometries(VIEW.scene.geometries).at[hit.geometry];
+    Triangle triangle = Triangles(record.triangles).at[hit.primitive];
+    if ((triangle.flags & TRIANGLE_ONE_SIDED) != 0) return false;
+    if (ray_cut_outs == CUT_OUTS_SOLID) return true;
+    float coverage = cut_out_of(triangle).coverage;
+    if (coverage <= 0.0) return false;
+    stopped = ray_cut_outs == CUT_OUTS_SKIPPED;
+    if (ray_cut_outs == CUT_OUTS_MASKED) {
+        TraceVertices vertices = TraceVertices(record.vertices);
+        vec2 a = vertices.at[triangle.indices[0]].st, b = vertices.at[triangle.indices[1]].st, c = vertices.at[triangle.indices[2]].st;
+        stopped = mask_is_solid(a + (b - a) * hit.barycentrics.x + (c - a) * hit.barycentrics.y, coverage);
+    }
+    return true;
+}
+
 // Whether a triangle with holes, or one with an opposite in its plane, stops the ray at the hit.
 bool is_stopped_by(Hit hit, vec3 direction) {
+    bool stopped;
+    if (CUT_OUTS != 0 && ray_cut_outs != CUT_OUTS_TESTED && meets_untested(hit, stopped)) return stopped;
     SurfacePoint p = surface_point(hit);
     if ((p.triangle.flags & TRIANGLE_ONE_SIDED) != 0) return !is_culled(p, direction);
     return is_solid_at(p, hit.t * VIEW.camera.pixel_spread);

@@ -5,6 +5,9 @@
 #include "trace/lights.glsl"
 #include "trace/trace.glsl"
 #include "trace/filters.glsl"
+#ifdef SCATTERED
+#include "trace/scattered.glsl"
+#endif
 
 const uint MASK_SHADOW = MASK_SOLID | MASK_THIRD_SOLID;
 
@@ -17,7 +20,11 @@ uint shadow_mask(bool first_person) { return first_person ? MASK_SOLID : MASK_SH
 // direction twice.
 bool light_arrives(LightSample s, vec3 origin, uint mask) {
     if (!s.sky && s.distance <= 0.0) return true;
+#ifdef SCATTERED
+    Hit hit = trace_scattered(origin, 0.0, s.direction, s.distance, mask | MASK_SKY, !s.sky);
+#else
     Hit hit = trace_ray(origin, 0.0, s.direction, s.distance, mask | MASK_SKY, !s.sky);
+#endif
     return hit.geometry == NO_HIT || (s.sky && Geometries(VIEW.scene.geometries).at[hit.geometry].kind == KIND_SKY);
 }
 

@@ -44,6 +44,7 @@ Hit payload_hit() {
 Hit follow_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bool any_hit) {
     // the miss shader reports NO_HIT; without a report the ray is blocked
     payload.geometry = any_hit ? 0 : NO_HIT;
+    if (CUT_OUTS != 0) payload.primitive = ray_cut_outs;
     uint flags = any_hit ? gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT : gl_RayFlagsNoneEXT;
     // the hit shader names what is counted
     if (HIT_FEEDBACK != 0) flags &= ~gl_RayFlagsSkipClosestHitShaderEXT;

@@ -15,6 +15,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Tra
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Portals { PortalRecord at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer MirrorPlanes { MirrorPlane at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer BodyTriangles { BodyTriangle at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer CutOuts { CutOut at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Skies { SkyRecord at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TriangleLights { TriangleLight at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer SphereLights { SphereLight at[]; };

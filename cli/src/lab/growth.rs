@@ -26,7 +26,7 @@ use crate::settings::SettingArgs;
 use crate::timings::Timings;
 use crate::view::{draw, load};
 
-/// Measure how the cost of a frame grows: with pixels, lights, triangles, entities, curves, layers, mirrors
+/// Measure how the cost of a frame grows: with pixels, lights, triangles, entities, curves, layers, mirrors, trees
 ///
 /// Draws made-up scenes in the traced look, each larger in one respect, and writes milliseconds by pass and bytes by
 /// purpose: growth.json, growth.csv, growth.html with curves, and a picture of the largest size. For each axis it
@@ -39,7 +39,7 @@ pub struct GrowthArgs {
     /// Folder for the results
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
-    /// What grows: pixels, lights, triangles, entities, curves, layers or mirrors, with sizes in place of the usual
+    /// What grows: pixels, lights, triangles, entities, curves, layers, mirrors or trees, with sizes in place of the usual
     /// ones; may be repeated; default: all
     #[arg(long, value_name = "NAME[=SIZE,…]", value_parser = parse_axis)]
     axis: Vec<Sizes>,

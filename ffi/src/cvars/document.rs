@@ -24,6 +24,7 @@ const COMPARED: &[&str] = &[
     "rt_taaMaximum",
     "rt_hitFeedback",
     "rt_firstHits",
+    "rt_cutouts",
 ];
 
 /// A row of a table. The help of variables without effect ends with a sentence that their table states once.

@@ -15,6 +15,8 @@ pub struct AlphaGrid {
     height: u32,
     cells: Vec<(u8, u8)>,
     whole: (u8, u8),
+    /// Number of texels of each alpha.
+    counts: Box<[u32; 256]>,
 }
 
 impl AlphaGrid {
@@ -39,7 +41,14 @@ impl AlphaGrid {
             }
         }
         let whole = cells.iter().fold((u8::MAX, 0), join);
+        let mut counts = Box::new([0; 256]);
+        for texel in texels {
+            if let Some(count) = counts.get_mut(usize::from(texel[3])) {
+                *count += 1;
+            }
+        }
         Some(Self {
+            counts,
             width,
             height,
             cells,
@@ -75,6 +84,15 @@ impl AlphaGrid {
             }
         }
         range
+    }
+
+    /// Part of the image whose alpha passes a test.
+    #[allow(clippy::cast_precision_loss)] // texels of an image
+    pub fn share(&self, passes: impl Fn(u8) -> bool) -> f32 {
+        let counted = (0..=u8::MAX).zip(self.counts.iter());
+        let passing = counted.filter(|(alpha, _)| passes(*alpha));
+        let passing: u32 = passing.map(|(_, count)| count).sum();
+        passing as f32 / self.counts.iter().sum::<u32>().max(1) as f32
     }
 
     fn cell(&self, x: i32, y: i32, clamped: bool) -> (u8, u8) {
@@ -153,6 +171,13 @@ mod tests {
             let slanted = [(0.95, 0.0), (0.7, 1.0), (0.95, 1.0)].map(Vec2::from);
             assert_eq!(grid.range(slanted, true), (0, 0), "{size}");
         }
+    }
+
+    #[test]
+    fn the_share_that_passes_is_counted() {
+        let grid = halves(64);
+        assert_eq!(grid.share(|alpha| alpha >= 128), 0.5);
+        assert_eq!(grid.share(|_| true), 1.0);
     }
 
     #[test]

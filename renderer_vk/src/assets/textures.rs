@@ -368,6 +368,14 @@ impl Textures {
         }
     }
 
+    /// Part of an image whose alpha passes a test; `None` for a dynamic or unknown image.
+    pub fn alpha_share(&self, texture: u32, passes: impl Fn(u8) -> bool) -> Option<f32> {
+        match self.transparent.get(&texture) {
+            Some(grid) => Some(grid.share(passes)),
+            None => self.means.contains_key(&texture).then_some(1.0),
+        }
+    }
+
     fn create(&self, name: &str, levels: &[Image]) -> Result<gpu::Image, gpu::Error> {
         let (width, height) = levels.first().map_or((1, 1), |l| (l.width, l.height));
         let image = gpu::Image::new(

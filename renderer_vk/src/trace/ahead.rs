@@ -149,6 +149,7 @@ fn states(pass: Pass, settings: &Settings, needs: MapNeeds) -> Vec<usize> {
             Switch::ScreenHits => screen::in_use(settings),
             Switch::Adaptive => indirect::is_adaptive(settings),
             Switch::Roulette => settings.rt_bounce_roulette,
+            Switch::CutOuts => settings.rt_cutouts > 0,
             Switch::LightTree => light_selection::uses_tree(settings),
             Switch::SharedEyes => settings.rt_share_eyes && settings.anaglyph != Anaglyph::None,
             Switch::Ambient => indirect::adds_ambient(settings),

@@ -23,14 +23,8 @@ pub enum Coverage {
 impl Coverage {
     /// Coverage by the smallest and greatest alpha in the triangle and the test (`ALPHAFUNC_*`).
     fn of(alpha_func: u32, (low, high): (u8, u8)) -> Self {
-        let passes = |alpha: u8| match alpha_func {
-            c::ALPHAFUNC_GT0 => alpha > 0,
-            c::ALPHAFUNC_LT128 => alpha < 128,
-            c::ALPHAFUNC_GE128 => alpha >= 128,
-            _ => true,
-        };
         // every test is one threshold: if both ends pass, all values between them pass
-        match (passes(low), passes(high)) {
+        match (passes(alpha_func, low), passes(alpha_func, high)) {
             (true, true) => Self::Solid,
             (false, false) => Self::Hole,
             _ => Self::Mixed,
@@ -38,24 +32,39 @@ impl Coverage {
     }
 }
 
-/// Coverage of a triangle of a material by its texture coordinates. Mixed unless one constant image with an alpha
-/// channel decides: animated, transformed or generated coordinates and alphas change from frame to frame.
-pub fn coverage(assets: &Assets, material: u32, corners: [Vec2; 3]) -> Coverage {
+/// Whether an alpha passes a test (`ALPHAFUNC_*`).
+fn passes(alpha_func: u32, alpha: u8) -> bool {
+    match alpha_func {
+        c::ALPHAFUNC_GT0 => alpha > 0,
+        c::ALPHAFUNC_LT128 => alpha < 128,
+        c::ALPHAFUNC_GE128 => alpha >= 128,
+        _ => true,
+    }
+}
+
+/// The image whose alpha decides about the holes of a material.
+struct Deciding {
+    texture: u32,
+    clamped: bool,
+    alpha_func: u32,
+}
+
+/// `None` unless one constant image with an alpha channel decides: animated, transformed or generated coordinates and
+/// alphas change from frame to frame.
+fn deciding(assets: &Assets, material: u32) -> Option<Deciding> {
     let material = assets.materials.get(material);
-    let Some(index) = light::cut_out_stage(&material.shader) else {
-        return Coverage::Mixed;
-    };
+    let index = light::cut_out_stage(&material.shader)?;
     // a deformation may change texture coordinates
     if !material.shader.deforms.is_empty() {
-        return Coverage::Mixed;
+        return None;
     }
     // each stage that writes depth has its own holes
     let writes = material.shader.stages.iter().filter(|s| s.depth_write);
     if writes.count() != 1 {
-        return Coverage::Mixed;
+        return None;
     }
     let stage = assets.materials.stages(material).get(index);
-    let Some(stage) = stage.filter(|s| {
+    let stage = stage.filter(|s| {
         s.image_count == 1
             && s.tc_gen == c::TCGEN_BASE
             && s.tc_mod_count == 0
@@ -68,15 +77,31 @@ pub fn coverage(assets: &Assets, material: u32, corners: [Vec2; 3]) -> Coverage 
                 c::RGBGEN_ONE_MINUS_ENTITY,
             ]
             .contains(&s.rgb_gen)
-    }) else {
-        return Coverage::Mixed;
-    };
-    let Some((texture, clamped)) = assets.materials.image(stage) else {
-        return Coverage::Mixed;
-    };
-    (assets.textures.alpha_range(texture, corners, clamped)).map_or(Coverage::Mixed, |range| {
-        Coverage::of(stage.alpha_func, range)
+    })?;
+    let (texture, clamped) = assets.materials.image(stage)?;
+    Some(Deciding {
+        texture,
+        clamped,
+        alpha_func: stage.alpha_func,
     })
+}
+
+/// Coverage of a triangle of a material by its texture coordinates. Mixed unless one constant image decides.
+pub fn coverage(assets: &Assets, material: u32, corners: [Vec2; 3]) -> Coverage {
+    let Some(image) = deciding(assets, material) else {
+        return Coverage::Mixed;
+    };
+    let range = (assets.textures).alpha_range(image.texture, corners, image.clamped);
+    range.map_or(Coverage::Mixed, |range| {
+        Coverage::of(image.alpha_func, range)
+    })
+}
+
+/// Solid part of the image of an alpha-tested material; `None` unless one constant image decides.
+pub fn mean_coverage(assets: &Assets, material: u32) -> Option<f32> {
+    let image = deciding(assets, material)?;
+    let solid = |alpha| passes(image.alpha_func, alpha);
+    assets.textures.alpha_share(image.texture, solid)
 }
 
 #[cfg(test)]

@@ -56,6 +56,8 @@ pub struct FrameFacts {
     pub vertex_light: bool,
     /// Most vertices, and triangles that may have some.
     pub vertices: [u32; 2],
+    /// Scattered rays do not test the alpha of cut-outs.
+    pub cut_outs: bool,
 }
 
 impl FrameFacts {
@@ -78,6 +80,7 @@ impl FrameFacts {
             Switch::SmoothMaximum => self.smooth_maximum,
             Switch::Feedback => self.feedback,
             Switch::VertexLight => self.vertex_light,
+            Switch::CutOuts => self.cut_outs,
         }
     }
 

@@ -18,6 +18,7 @@ use support::slice;
 use super::beyond_sky::MapSkies;
 use super::bodies::{Bodies, body_surfaces};
 use super::bvh::{build_triangles, unordered};
+use super::cut_out_boxes::CutOuts;
 use super::cutout::Coverage;
 use super::doubled::doubled;
 use super::grid::{self, GridStructure};
@@ -109,6 +110,8 @@ pub struct StaticGeometry {
     pub map_skies: MapSkies,
     /// Its flat mirrors.
     pub mirrors: Mirrors,
+    /// Its alpha-tested surfaces.
+    pub cut_outs: CutOuts,
     /// Its refracting bodies.
     pub bodies: Bodies,
     /// Surfaces that filter light, and liquids; empty unless the caller sets them.
@@ -391,6 +394,7 @@ impl StaticGeometry {
             layers: layers(scene, materials),
             map_skies: MapSkies::new(scene, materials),
             mirrors: Mirrors::new(device, scene, materials)?,
+            cut_outs: CutOuts::new(device, scene, materials)?,
             bodies: Bodies::new(device, scene, materials, &bodies)?,
             world_triangles: grouped.world_triangles(),
             surroundings: Surroundings::default(),

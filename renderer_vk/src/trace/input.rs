@@ -110,6 +110,10 @@ pub trait MaterialTable {
     fn coverage(&self, _material: u32, _corners: [Vec2; 3]) -> Coverage {
         Coverage::Mixed
     }
+    /// Solid part of the image of an alpha-tested material; `None` if it is unknown.
+    fn mean_coverage(&self, _material: u32) -> Option<f32> {
+        None
+    }
     /// Device addresses of the material arrays.
     fn buffers(&self) -> MaterialBuffers;
     /// Bindless index of the clamped sampler with mip levels, for sky boxes.

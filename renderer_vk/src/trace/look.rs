@@ -11,7 +11,7 @@ use shaders::types::{Fog, MaterialBuffers};
 #[cfg(test)]
 use super::accel::AccelMemory;
 use super::ahead::MapNeeds;
-use super::cutout::{Coverage, coverage};
+use super::cutout::{Coverage, coverage, mean_coverage};
 use super::fog_light;
 use super::geometry::StaticGeometry;
 use super::input::{Kind, MaterialInfo, MaterialTable, StaticScene, StaticSurface};
@@ -53,6 +53,10 @@ impl MaterialTable for Assets {
             sky,
         };
         (drawn, info)
+    }
+
+    fn mean_coverage(&self, material: u32) -> Option<f32> {
+        mean_coverage(self, material)
     }
 
     fn coverage(&self, material: u32, corners: [Vec2; 3]) -> Coverage {

@@ -19,6 +19,7 @@ pub mod bvh;
 mod cell_grid;
 mod cell_light;
 pub mod counters;
+mod cut_out_boxes;
 pub mod cutout;
 pub mod denoise;
 mod doubled;

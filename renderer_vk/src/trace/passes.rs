@@ -87,6 +87,8 @@ pub enum Switch {
     Feedback,
     /// Bounces take the light of vertices (`rt_bounceCache`).
     VertexLight,
+    /// Scattered rays do not test the alpha of cut-outs (`rt_cutouts`).
+    CutOuts,
 }
 
 /// Declaration of a pass.
@@ -147,7 +149,7 @@ macro_rules! passes {
         /// Declarations, in the order of [`Pass`].
         pub static TABLE: &[Row] = {
             #[allow(clippy::enum_glob_use)] // rows name many of them
-            use {Resource::*, Shader::{Compute, Rays}, Switch::{Adaptive, BlueNoise, Bounces, Caustics, Feedback, Gloss, LightTree, LitFog, MapFog, Roulette, SharedEyes, Timed, VertexLight}};
+            use {Resource::*, Shader::{Compute, Rays}, Switch::{Adaptive, BlueNoise, Bounces, Caustics, CutOuts, Feedback, Gloss, LightTree, LitFog, MapFog, Roulette, SharedEyes, Timed, VertexLight}};
             &[$(Row { $($field: $value,)* ..Row::of(concat!($($about),+), $name, $shader, Size::$size) }),+]
         };
     };
@@ -312,7 +314,7 @@ passes! {
     }
     /// Rays of a bounce.
     BounceRays = "trace_bounce_rays", Rays(&shaders::TRACE_BOUNCE_RAYS), Cells {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive), (ids::bounce_rays::ROULETTE, Roulette), (ids::feedback::HIT_FEEDBACK, Feedback)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::screen::SCREEN_HITS, Switch::ScreenHits), (ids::subsample::ADAPTIVE, Adaptive), (ids::bounce_rays::ROULETTE, Roulette), (ids::feedback::HIT_FEEDBACK, Feedback), (ids::candidate::CUT_OUTS, CutOuts)],
         reads: &[Scene, GBuffer, Positions, Normals],
         may_read: &[GradientPixels, BounceLights, GlossSurfaces, ScreenHits, SelectedCells, DirectLight],
         writes: &[BounceHits],
@@ -335,7 +337,7 @@ passes! {
     }
     /// Shadow rays to those lights; the last writes the light of the paths, of one of both kinds.
     BounceLight = "trace_bounce_light", Rays(&shaders::TRACE_BOUNCE_LIGHT), Cells {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::subsample::ADAPTIVE, Adaptive), (ids::feedback::HIT_FEEDBACK, Feedback)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::photons::CAUSTICS, Caustics), (ids::clock::TIMED, Timed), (ids::random::BLUE_NOISE, BlueNoise), (ids::subsample::ADAPTIVE, Adaptive), (ids::feedback::HIT_FEEDBACK, Feedback), (ids::candidate::CUT_OUTS, CutOuts)],
         reads: &[Scene, Lights, GBuffer, Positions, Normals, BounceLights],
         may_read: &[GradientPixels, GlossSurfaces, SelectedCells],
         writes: &[IndirectLight, GlossLight],

@@ -502,6 +502,7 @@ impl ViewTracer {
             feedback: self.feedback.is_on(),
             vertex_light: self.vertex_light.is_on(),
             vertices: self.vertex_light.sizes(),
+            cut_outs: settings.rt_cutouts > 0,
         }
     }
 

@@ -20,6 +20,13 @@ pub const MIRROR_TWO_SIDED: u32 = 1;
 /// They are glass or surfaces of liquids.
 pub const MIRROR_TRANSLUCENT: u32 = 2;
 
+/// How rays of scattered light meet cut-outs (`rt_cutouts`): by their alpha test; as solid; as solid, but a ray may skip a
+/// whole one; by a mask that needs no image.
+pub const CUT_OUTS_TESTED: u32 = 0;
+pub const CUT_OUTS_SOLID: u32 = 1;
+pub const CUT_OUTS_SKIPPED: u32 = 2;
+pub const CUT_OUTS_MASKED: u32 = 3;
+
 /// Photons in a row of their launch.
 pub const PHOTON_ROW: u32 = 512;
 

@@ -49,6 +49,18 @@ pub struct MirrorPlane {
     pub flags: u32,
 }
 
+/// A cut-out surface of the map, to rays that do not test its alpha.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct CutOut {
+    /// Least corner of the box around it and the surfaces that make up one thing with it, in the space of its model.
+    pub mins: Vec3,
+    /// Solid part of its material's image; 0: unknown, its alpha is tested.
+    pub coverage: f32,
+    /// Greatest corner.
+    pub maxs: Vec3,
+}
+
 /// Bounds of surfaces that only some rays test, and limits of paths.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -70,6 +82,8 @@ pub struct TransportView {
     /// Pairs of floats, `SPECULAR_TABLE` rows by roughness of as many by the cosine to the view: the specular albedo is the
     /// first times the reflectance at normal incidence, plus the second.
     pub specular_albedo: u64,
+    /// For each surface of the map, its [`CutOut`]; ends behind the last cut-out. 0: the map has none.
+    pub cut_outs: u64,
     /// Number of `filters`.
     pub filter_count: u32,
     /// Number of `layers`; all ones: unknown, a ray tests layers always.
@@ -102,6 +116,8 @@ pub struct TransportView {
     pub ambient: f32,
     /// Decrease of that light with the length of the last ray, per unit.
     pub ambient_fall: f32,
+    /// `CUT_OUTS_*`.
+    pub cut_out_rays: u32,
 }
 
 /// The flares of a view.

@@ -15,6 +15,7 @@ pub enum Axis {
     Curves,
     Layers,
     Mirrors,
+    Trees,
 }
 
 /// Names and sizes of an axis.
@@ -34,7 +35,7 @@ const ASPECT: f64 = 16.0 / 9.0;
 
 impl Axis {
     /// All, in the order of the page.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Pixels,
         Self::Lights,
         Self::Triangles,
@@ -42,6 +43,7 @@ impl Axis {
         Self::Curves,
         Self::Layers,
         Self::Mirrors,
+        Self::Trees,
     ];
 
     fn description(self) -> Description {
@@ -88,6 +90,12 @@ impl Axis {
                 sizes: EIGHT,
                 limits: (0.0, 16.0),
             },
+            Self::Trees => Description {
+                name: "trees",
+                unit: "trees of 32 leaves with holes, one surface each",
+                sizes: &[0.0, 12.0, 48.0, 192.0],
+                limits: (0.0, 1e4),
+            },
         }
     }
 
@@ -123,6 +131,7 @@ impl Axis {
                 case.settings.subdivisions = (1.0 / size) as f32;
             }
             Self::Layers => case.scene.layers = count,
+            Self::Trees => case.scene.trees = count,
             Self::Mirrors => {
                 case.scene.mirrors = true;
                 case.settings.rt_max_depth = count as u32;

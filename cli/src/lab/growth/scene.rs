@@ -45,6 +45,17 @@ growth/lamp
         map $whiteimage
     }
 }
+growth/leaf
+{
+    surfaceparm trans
+    cull none
+    {
+        map textures/growth/leaf.tga
+        alphaFunc GE128
+        depthWrite
+        rgbGen exactVertex
+    }
+}
 growth/layer
 {
     surfaceparm nolightmap
@@ -92,6 +103,14 @@ const WAVES: f32 = 12.0;
 const COLUMNS: [usize; 2] = [6, 4];
 const COLUMN: f32 = 40.0;
 
+/// Height of a tree's crown above the floor, half its side, and the leaves in it: squares of this side. Units.
+const CROWN: (f32, f32) = (140.0, 70.0);
+const LEAVES: usize = 32;
+const LEAF: f32 = 64.0;
+
+/// Texels along a side of the image of leaves.
+const LEAF_TEXELS: u16 = 64;
+
 /// Distance of the first layer from the camera, and of one from the next, units.
 const LAYERS: (f32, f32) = (32.0, 4.0);
 
@@ -107,6 +126,8 @@ pub struct Made {
     pub triangles: usize,
     /// Translucent layers before the camera.
     pub layers: usize,
+    /// Trees, of leaves with holes.
+    pub trees: usize,
     /// Curved columns.
     pub columns: bool,
     /// Two mirrors that face each other, before and behind the camera.
@@ -119,6 +140,7 @@ impl Default for Made {
             lights: 16,
             triangles: 2048,
             layers: 0,
+            trees: 0,
             columns: false,
             mirrors: false,
         }
@@ -142,6 +164,10 @@ impl Made {
         if self.columns {
             add_columns(&mut map, wall);
         }
+        if self.trees > 0 {
+            let leaf = map.add_shader("growth/leaf", 0, 0);
+            add_trees(&mut map, leaf, self.trees);
+        }
         if self.layers > 0 {
             let layer = map.add_shader("growth/layer", 0, 0);
             for number in 0..self.layers {
@@ -162,6 +188,7 @@ impl Made {
         map.add_box_faces(wall, Vec3::splat(-BOX), Vec3::splat(BOX), false);
         let mut files = MemoryFiles::new();
         files.insert("scripts/growth.shader", SCRIPT)?;
+        files.insert("textures/growth/leaf.tga", leaf_image())?;
         // a surface without stored light would be shown as white, and not be lit
         let page = map.add_lightmap([128; 3]);
         let mut bsp = map.build();
@@ -270,6 +297,64 @@ fn add_columns(map: &mut MapBuilder, wall: ShaderId) {
     }
 }
 
+/// Crowns of trees in the hall, evenly: each a surface of leaves at random places and angles.
+fn add_trees(map: &mut MapBuilder, leaf: ShaderId, count: usize) {
+    let size = (HIGH - LOW).truncate();
+    let across = ((count as f32 * size.y / size.x).sqrt().ceil() as usize).max(1);
+    let along = count.div_ceil(across).max(1);
+    let (height, half) = CROWN;
+    let mut state = 1u32;
+    // a linear congruential generator: the same trees on every machine
+    let mut random = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as f32 / 8_388_608.0 - 1.0
+    };
+    for number in 0..count {
+        let at = Vec2::new((number % along) as f32, (number / along) as f32) + 0.5;
+        let middle = LOW.truncate() + at * size / Vec2::new(along as f32, across as f32);
+        let middle = middle.extend(LOW.z + height);
+        let (mut vertices, mut indices) = (Vec::new(), Vec::new());
+        for _ in 0..LEAVES {
+            let center = middle + Vec3::new(random(), random(), random()) * (half - LEAF * 0.5);
+            let up = Vec3::new(random(), random(), random());
+            let normal = up.try_normalize().unwrap_or(Vec3::Z);
+            let u = normal.any_orthonormal_vector();
+            let v = normal.cross(u);
+            let first = vertices.len() as i32;
+            for corner in [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y] {
+                let at = (corner - 0.5) * LEAF;
+                vertices.push(DrawVert {
+                    position: center + u * at.x + v * at.y,
+                    st: corner,
+                    lightmap: Vec2::ZERO,
+                    normal,
+                    color: [255; 4],
+                });
+            }
+            indices.extend([0, 1, 2, 0, 2, 3].map(|corner| first + corner));
+        }
+        map.add_soup(leaf, &vertices, &indices);
+    }
+}
+
+/// An uncompressed TGA image of green discs without a background: four along each side, 50 % of the area.
+fn leaf_image() -> Vec<u8> {
+    let [low, high] = LEAF_TEXELS.to_le_bytes();
+    let mut bytes = vec![
+        0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, low, high, low, high, 32, 0x28,
+    ];
+    let cell = f32::from(LEAF_TEXELS / 4);
+    for y in 0..LEAF_TEXELS {
+        for x in 0..LEAF_TEXELS {
+            let at = (Vec2::new(f32::from(x), f32::from(y)) + 0.5) / cell;
+            // pi r^2 = 0.5
+            let solid = (at.fract() - 0.5).length() < 0.3989;
+            bytes.extend([60, 160, 80, if solid { 255 } else { 0 }]);
+        }
+    }
+    bytes
+}
+
 /// Entities of the brush model in the hall, evenly, `model` being its handle.
 pub fn entities(count: usize, model: i32) -> impl Iterator<Item = RefEntity> {
     let side = (count as f64).cbrt().ceil().max(1.0) as usize;
@@ -314,6 +399,20 @@ mod tests {
             };
             assert_eq!(of("growth/lamp"), lights);
         }
+        for trees in [1, 12] {
+            let made = Made {
+                trees,
+                ..Made::default()
+            };
+            let map = map(&made);
+            let crowns = map.surfaces.iter();
+            let crowns = crowns.filter(|s| map.shader(s.shader).name == "growth/leaf");
+            assert_eq!(crowns.count(), trees);
+        }
+        let image = relight::image::decode("leaf.tga", "tga", &leaf_image()).unwrap();
+        let solid = image.rgba.chunks_exact(4).filter(|t| t[3] > 127).count();
+        let texels = image.rgba.len() / 4;
+        assert!((solid as f64 / texels as f64 - 0.5).abs() < 0.02, "{solid}");
         for triangles in [2u16, 2048, 10_000, 50_000] {
             let made = Made {
                 triangles: usize::from(triangles),

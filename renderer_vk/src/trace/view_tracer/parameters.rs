@@ -187,6 +187,8 @@ impl ViewTracer {
             roulette: u32::from(settings.rt_bounce_roulette),
             ambient: settings.rt_bounce_ambient,
             ambient_fall: settings.rt_bounce_ambient_fall,
+            cut_outs: geometry.map_or(0, |g| g.cut_outs.address()),
+            cut_out_rays: settings.rt_cutouts,
             filters: geometry.map_or(0, |g| g.surroundings.filters()),
             filter_count: geometry.map_or(0, |g| g.surroundings.filter_count()),
             layers,

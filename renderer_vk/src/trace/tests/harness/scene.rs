@@ -1,5 +1,6 @@
 //! Scenes built in code: triangles, materials, lights and moving geometry, and their upload.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
@@ -51,6 +52,8 @@ pub struct Scene {
     pub dlights: Vec<DynamicLight>,
     /// The map's tree with its light lists; without it, all lights reach all points.
     pub tree: Option<(q3bsp::Bsp, LightLists)>,
+    /// Mean coverage of alpha-tested materials.
+    pub coverages: HashMap<u32, f32>,
     /// `rt_gridCells`.
     pub grid_cells: u32,
     pub def: RefDef,
@@ -93,6 +96,7 @@ impl Scene {
             portals: Vec::new(),
             dlights: Vec::new(),
             tree: None,
+            coverages: HashMap::new(),
             grid_cells: 0,
             def: RefDef {
                 width: size,
@@ -400,6 +404,7 @@ impl Scene {
         let materials = Table {
             metal: (self.materials.iter()).any(|gpu| gpu.0.specular.metal > 0.0),
             infos: self.materials.iter().map(|m| m.1).collect(),
+            coverages: self.coverages.clone(),
             buffers,
         };
         let all: Vec<u32> = (0..(self.lights.len() + self.points.len()) as u32).collect();
@@ -455,6 +460,7 @@ pub struct Uploaded {
 pub struct Table {
     infos: Vec<MaterialInfo>,
     metal: bool,
+    coverages: HashMap<u32, f32>,
     buffers: [Buffer; 4],
 }
 
@@ -483,6 +489,10 @@ impl MaterialTable for Table {
 
     fn has_metal(&self) -> bool {
         self.metal
+    }
+
+    fn mean_coverage(&self, material: u32) -> Option<f32> {
+        self.coverages.get(&material).copied()
     }
 
     fn generation(&self) -> u64 {
