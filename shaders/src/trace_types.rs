@@ -28,11 +28,10 @@ pub use structures::{
     BvhInstance, BvhNode, BvhTriangle, FilterStep, FirstHitsStep, GeometryRecord, GridRecord,
     HybridStep, PassStep,
 };
-pub use surroundings::{FlareView, FogView, MirrorPlane, PortalRecord, SkyRecord, TransportView};
-pub use vertex_light::{LightGrid, VertexLightView, VertexSum};
 pub use surroundings::{
     CutOut, FlareView, FogView, MirrorPlane, PortalRecord, SkyRecord, TransportView,
 };
+pub use vertex_light::{LightGrid, VertexLightView, VertexSum};
 pub use view::{CameraView, ExposureView, ImageView, PostView, SceneView, TargetView};
 
 /// Parameters of one traced view: the traced size, and a block for each concern. Blocks with addresses come first,

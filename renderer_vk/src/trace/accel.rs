@@ -4,7 +4,8 @@
 //! frame: the CPU transforms them to world space, and those of equal visibility and kind share one structure, built
 //! each frame. All builds of a frame are one batch.
 
-use std::iter;
+mod placements;
+
 use std::time::Instant;
 
 use glam::{Mat3, Vec3};
@@ -16,9 +17,9 @@ use support::slice;
 
 use super::bvh::{INSTANCES, build_triangles, widen};
 use super::feedback::{Feedback, State};
-use super::geometry::{StaticGeometry, StaticPart, Structure};
+use super::geometry::{StaticGeometry, Structure};
 use super::input::{Kind, MaterialTable};
-use super::parts::{Parts, Seen, Slot, axes, is_solid};
+use super::parts::{Parts, Seen, Slot, axes};
 use super::shapes::{Bottom, OwnBottom, Shapes, Use};
 use super::tracer::Tracer;
 use crate::gpu::{
@@ -26,6 +27,9 @@ use crate::gpu::{
 };
 use crate::scene::TracedScene;
 use crate::statistics::MovingCost;
+
+pub use placements::DrawnGeometry;
+use placements::{Part, Placement, Placements};
 
 /// Hit group: solids report the nearest hit, translucent layers search in their any-hit shader.
 fn hit_group(kind: Kind) -> u32 {
@@ -76,122 +80,6 @@ pub struct AccelMemory {
     pub changing: u64,
     /// The top level.
     pub top: u64,
-}
-
-/// Triangles of one geometry record, for [`FirstHits`](super::first_hits::FirstHits).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct DrawnGeometry {
-    /// Index of the record.
-    pub record: u32,
-    /// Number of triangles.
-    pub triangles: u32,
-    /// `MASK_*` bits of the rays that meet it.
-    pub mask: u8,
-    /// Kind of its triangles.
-    pub kind: Kind,
-}
-
-/// Source of a placement, before the structures are built.
-enum Part<'a> {
-    /// A structure of the map.
-    Static(&'a Structure),
-    /// Index of the slot.
-    Slot(usize),
-    /// Index of the part.
-    Kept(usize, super::shapes::Prepared),
-}
-
-/// A structure with its transform.
-struct Placement<'a> {
-    part: Part<'a>,
-    axis: Mat3,
-    origin: Vec3,
-    record: u32,
-    mask: u8,
-    kind: Kind,
-    /// It belongs to a model.
-    of_model: bool,
-}
-
-/// The placements of a view.
-#[derive(Default)]
-struct Placements<'a> {
-    placed: Vec<Placement<'a>>,
-    /// One record per geometry of a structure; a hit's record index is the structure's first plus the geometry's
-    /// number.
-    records: Vec<GeometryRecord>,
-    /// The same as draws.
-    drawn: Vec<DrawnGeometry>,
-}
-
-impl<'a> Placements<'a> {
-    fn add(
-        &mut self,
-        part: Part<'a>,
-        (axis, origin): (Mat3, Vec3),
-        mask: u8,
-        kind: Kind,
-        records: impl IntoIterator<Item = (GeometryRecord, Kind, u32)>,
-    ) {
-        self.placed.push(Placement {
-            part,
-            axis,
-            origin,
-            record: u32::try_from(self.records.len()).unwrap_or(u32::MAX),
-            mask,
-            kind,
-            of_model: false,
-        });
-        for (record, kind, triangles) in records {
-            self.drawn.push(DrawnGeometry {
-                record: u32::try_from(self.records.len()).unwrap_or(u32::MAX),
-                triangles,
-                mask,
-                kind,
-            });
-            self.records.push(record);
-        }
-    }
-
-    /// Adds the world and the brush models of a view.
-    fn add_map(&mut self, view: &TracedScene, geometry: &'a StaticGeometry) {
-        let submodels = view.look.submodels.iter().map(|s| (s.model, s.instance));
-        for (model, index) in iter::once((0, 0)).chain(submodels) {
-            let Some(instance) = slice::get(&view.instances, index as usize) else {
-                continue;
-            };
-            let axis = axes(instance);
-            // axes without volume have no inverse: the model is left out
-            if !is_solid(axis) {
-                continue;
-            }
-            for blas in geometry.structures.iter().filter(|s| s.model == model) {
-                let Some(first) = slice::get(&blas.parts, 0) else {
-                    continue;
-                };
-                let record = |part: &StaticPart| {
-                    let record = GeometryRecord {
-                        triangles: part.triangles,
-                        vertices: geometry.vertices,
-                        instance: index,
-                        kind: part.kind.index(),
-                    };
-                    (record, part.kind, part.count)
-                };
-                let mask = |mask, part: &StaticPart| mask | Seen::Always.mask(part.kind);
-                let mask = blas.parts.iter().fold(0, mask);
-                let structure = Part::Static(&blas.structure);
-                let records = blas.parts.iter().map(record);
-                self.add(
-                    structure,
-                    (axis, instance.origin),
-                    mask,
-                    first.kind,
-                    records,
-                );
-            }
-        }
-    }
 }
 
 /// The driver's structures.

@@ -12,8 +12,7 @@ use crate::settings::{Anaglyph, DenoiserChoice, Settings};
 
 /// Passes that the settings decide about, or that every frame runs, the slowest to compile first. Others are
 /// compiled when a frame first runs them.
-const AHEAD: [Pass; 45] = [
-const AHEAD: [Pass; 42] = [
+const AHEAD: [Pass; 46] = [
     Pass::Primary,
     Pass::VertexGather,
     Pass::BounceShadeLast,

@@ -5,8 +5,9 @@ use shaders::trace_types::constants as t;
 
 use super::denoise;
 use super::frame_passes::FramePasses;
-use super::passes::Pass;
-use crate::gpu::Error;
+use super::passes::{Pass, Resource};
+use super::targets::Targets;
+use crate::gpu::{Access, Error};
 use crate::settings::{DenoiserChoice, MOST_BOUNCES, Settings};
 
 // No stream of random numbers is used twice: those of three passes of each bounce, then those of light across mirrors, then
@@ -129,5 +130,23 @@ fn trace_path(
         passes.run_numbered(shade, bounce, part)?;
         passes.run_numbered(Pass::BounceLight, bounce, part)?;
     }
+    Ok(())
+}
+
+/// Clears bounced light, unless it is black. The adaptive denoiser, whose image holds other data meanwhile, does not
+/// read it.
+///
+/// # Errors
+/// Out of memory.
+pub fn clear(targets: &mut Targets, passes: &mut FramePasses<'_>) -> Result<(), Error> {
+    if let Some(indirect) = &targets.indirect
+        && !targets.indirect_is_black
+    {
+        let (rec, access) = (&mut *passes.rec, Access::TRANSFER);
+        let mut pass = rec.pass("trace_no_indirect", access, access)?;
+        pass.clear_image(indirect, [0.0; 4]);
+        targets.indirect_is_black = true;
+    }
+    passes.wrote(Resource::IndirectLight);
     Ok(())
 }

@@ -1,7 +1,11 @@
-//! What the settings say about the sampling of lights.
+//! What the settings say about the sampling of lights, and the passes of direct light.
 
+use shaders::trace_types::TraceView;
 use shaders::trace_types::constants as c;
 
+use super::frame_passes::FramePasses;
+use super::passes::Pass;
+use crate::gpu::Error;
 use crate::settings::{LightSelection, Settings};
 
 /// Whether surfaces are lit; otherwise they show their albedo.
@@ -37,4 +41,24 @@ pub fn reuses_samples(settings: &Settings) -> bool {
 pub fn uses_tree(settings: &Settings) -> bool {
     settings.rt_light_selection == LightSelection::Tree
         && estimator(settings) == c::SELECT_RESAMPLED
+}
+
+/// Records the passes of direct light.
+///
+/// # Errors
+/// Out of memory, or the driver refuses a pipeline.
+pub fn record(
+    passes: &mut FramePasses<'_>,
+    settings: &Settings,
+    params: &TraceView,
+) -> Result<(), Error> {
+    if !samples_one_light(settings) {
+        return passes.run(Pass::Direct);
+    }
+    passes.run(Pass::SampleLights)?;
+    passes.run(Pass::SampledDirect)?;
+    if params.lights.sun_count > 0 {
+        passes.run(Pass::Suns)?;
+    }
+    Ok(())
 }

@@ -61,6 +61,8 @@ pub struct Prepared {
     pub vertices: u64,
     /// Address of its `Triangle`s.
     pub triangles: u64,
+    /// Number of them.
+    pub count: u32,
     /// An animated part's pose.
     pose: PoseKey,
 }
@@ -72,10 +74,6 @@ pub struct Use {
     pub body: Option<u32>,
     /// Its structure must have this frame's shape.
     pub refit: bool,
-    /// Number of them.
-    pub count: u32,
-    /// Index of an animated part's pose.
-    pose: usize,
 }
 
 /// Bytes of the structures, by use.

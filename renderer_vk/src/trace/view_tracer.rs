@@ -15,18 +15,17 @@ use super::blue_noise::BlueNoise;
 use super::counters::RayCounters;
 use super::denoise::{self, Denoiser, OtherEye};
 use super::feedback::Feedback;
-use super::denoise::{self, Denoiser};
 use super::first_hits::FirstHits;
 use super::fog::LitFog;
 use super::frame_passes::{FrameFacts, FramePasses};
 use super::geometry::StaticGeometry;
 use super::indirect;
 use super::input::MaterialTable;
-use super::light_selection::{is_lit, reuses_samples, samples_one_light, uses_tree};
+use super::light_selection::{self, is_lit, reuses_samples, uses_tree};
 use super::lights::MapLights;
 use super::motion::Motion;
 use super::pass_set::PassSet;
-use super::passes::{COUNTERS, Pass, Resource};
+use super::passes::{COUNTERS, Pass};
 use super::photons::{self, Photons};
 use super::pixel_times::PixelTimes;
 use super::reservoirs::Reservoirs;
@@ -35,7 +34,7 @@ use super::specular::SpecularTable;
 use super::targets::{OwnImages, Targets};
 use super::vertex_light::VertexLight;
 use crate::api::DynamicLight;
-use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
+use crate::gpu::{Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
 use crate::scene::TracedScene;
 use crate::settings::{DebugOutput, DenoiserChoice, Settings};
@@ -364,10 +363,7 @@ impl ViewTracer {
         let (accel, feedback) = (&mut self.accel, &mut self.feedback);
         let accel = accel.record_fed(rec, scene, map_geometry, materials, feedback)?;
         let feedback = self.feedback.count(rec)?;
-        let geometry = map.map(|m| m.geometry);
-        (self.first_hits).prepare(&self.device, settings, size, geometry)?;
-        let accumulated = self.accumulated_before(scene, materials, settings);
-        let accel = self.accel.record(rec, scene, geometry, materials)?;
+        (self.first_hits).prepare(&self.device, settings, size, map_geometry)?;
         let portals: Vec<PortalRecord> = if settings.hides_portals() {
             Vec::new()
         } else {
@@ -440,13 +436,13 @@ impl ViewTracer {
         if self.reservoirs.is_on() {
             self.reservoirs.record(passes)?;
         } else {
-            light_directly(passes, settings, params)?;
+            light_selection::record(passes, settings, params)?;
         }
         self.vertex_light.record(passes)?;
         if facts.bounces {
             indirect::record(passes, &params.transport, settings.rt_samples)?;
         } else {
-            clear_indirect(targets, passes)?;
+            indirect::clear(targets, passes)?;
         }
         if facts.gloss {
             indirect::record_specular(passes, &params.transport)?;
@@ -544,38 +540,6 @@ fn own_images(settings: &Settings, output: [u32; 2], specular: bool) -> OwnImage
         composite: shows_steps,
         fog: shows_steps,
     }
-}
-
-/// Records the passes of direct light.
-fn light_directly(
-    passes: &mut FramePasses<'_>,
-    settings: &Settings,
-    params: &TraceView,
-) -> Result<(), Error> {
-    if !samples_one_light(settings) {
-        return passes.run(Pass::Direct);
-    }
-    passes.run(Pass::SampleLights)?;
-    passes.run(Pass::SampledDirect)?;
-    if params.lights.sun_count > 0 {
-        passes.run(Pass::Suns)?;
-    }
-    Ok(())
-}
-
-/// Clears bounced light, unless it is black. The adaptive denoiser, whose image holds other data meanwhile, does not
-/// read it.
-fn clear_indirect(targets: &mut Targets, passes: &mut FramePasses<'_>) -> Result<(), Error> {
-    if let Some(indirect) = &targets.indirect
-        && !targets.indirect_is_black
-    {
-        let (rec, access) = (&mut *passes.rec, Access::TRANSFER);
-        let mut pass = rec.pass("trace_no_indirect", access, access)?;
-        pass.clear_image(indirect, [0.0; 4]);
-        targets.indirect_is_black = true;
-    }
-    passes.wrote(Resource::IndirectLight);
-    Ok(())
 }
 
 /// Width and height of a viewport; `None` if it lies outside of the target.

@@ -118,6 +118,8 @@ pub struct TransportView {
     pub ambient_fall: f32,
     /// `CUT_OUTS_*`.
     pub cut_out_rays: u32,
+    /// To a multiple of eight bytes.
+    pub padding: u32,
 }
 
 /// The flares of a view.

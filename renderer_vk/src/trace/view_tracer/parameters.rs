@@ -189,6 +189,7 @@ impl ViewTracer {
             ambient_fall: settings.rt_bounce_ambient_fall,
             cut_outs: geometry.map_or(0, |g| g.cut_outs.address()),
             cut_out_rays: settings.rt_cutouts,
+            padding: 0,
             filters: geometry.map_or(0, |g| g.surroundings.filters()),
             filter_count: geometry.map_or(0, |g| g.surroundings.filter_count()),
             layers,
