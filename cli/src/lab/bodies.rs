@@ -58,14 +58,14 @@ pub struct BodiesArgs {
         default_value_t = 0.0,
         allow_hyphen_values = true
     )]
-    turn: f32,
+    rotate: f32,
     /// Size in pixels
     #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "512x288", value_parser = parse_size)]
     size: (u32, u32),
     /// Frames; the medians leave out the first 10, or half of them if there are fewer than 20
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(4..))]
     frames: u32,
-    /// Number of runs, each without and with feedback
+    /// Number of runs, in which all variants take turns
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
     runs: u32,
     /// Omit the comparison of the pictures
@@ -202,7 +202,7 @@ struct Stage<'a> {
 impl Stage<'_> {
     fn def(&self, frame: u32) -> RefDef {
         let mut camera = self.camera;
-        camera.yaw += self.args.turn * frame as f32;
+        camera.yaw += self.args.rotate * frame as f32;
         let mut def = camera.ref_def(self.args.size, FOV);
         def.time_ms = i32::try_from(frame.saturating_mul(FRAME_MS)).unwrap_or(i32::MAX);
         def

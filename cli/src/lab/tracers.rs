@@ -64,7 +64,7 @@ pub struct TracersArgs {
     /// 10, or half of them if there are fewer than 20
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u32).range(4..))]
     frames: u32,
-    /// Number of runs; in each run every tracer loads every map
+    /// Number of runs, in which all variants take turns
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
     runs: u32,
     /// Vulkan device: part of its name
