@@ -8,8 +8,8 @@
 // The rays of this invocation are of scattered light; not those of mirrors and glossy surfaces.
 bool rays_are_scattered = false;
 
-// Where a ray that has met a cut-out, and passes it, leaves the box around it; -1: the hit is none, or stops the ray. Its
-// coverage is the probability of that (Pohl et al., 15 Years Later, section 3.4).
+// Where a ray that has met a cut-out, and passes it, leaves the box around it; -1: the hit is none, or stops the ray, with
+// its coverage as probability (Memory-efficient Real-time Path Tracing for Computer Games, section 3.4).
 float skipped_until(Hit hit, vec3 origin, vec3 direction) {
     if (hit.geometry == NO_HIT) return -1.0;
     GeometryRecord record = Geometries(VIEW.scene.geometries).at[hit.geometry];
