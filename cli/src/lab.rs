@@ -2,6 +2,7 @@
 
 mod bodies;
 mod chromaticity;
+mod curves;
 mod estimators;
 mod growth;
 mod light_lists;
@@ -17,7 +18,7 @@ use clap::{Parser, Subcommand};
 
 use crate::outcome::parse;
 
-/// Measurements of Relight's renderer: light sampling, light lists, denoising, brightness, tracers
+/// Measurements of Relight's renderer: light sampling, light lists, denoising, brightness, tracers, curves
 #[derive(Parser, Debug)]
 #[command(name = "relight-lab", version)]
 pub struct Cli {
@@ -29,6 +30,7 @@ pub struct Cli {
 #[derive(Subcommand, Debug)]
 enum Command {
     Bodies(bodies::BodiesArgs),
+    Curves(curves::CurvesArgs),
     Estimators(estimators::EstimatorsArgs),
     Growth(growth::GrowthArgs),
     LightLists(light_lists::LightListsArgs),
@@ -50,6 +52,7 @@ const REPLACED: [(&str, &str, &str); 2] = [
 pub fn run() -> Result<ExitCode> {
     match parse::<Cli>(&REPLACED).command {
         Command::Bodies(args) => bodies::run(&args),
+        Command::Curves(args) => curves::run(&args),
         Command::Estimators(args) => estimators::run(&args),
         Command::Growth(args) => growth::run(&args),
         Command::LightLists(args) => light_lists::run(&args),

@@ -34,6 +34,7 @@
 mod cache;
 pub mod calibrate;
 pub mod compare;
+pub mod curves;
 pub mod emitters;
 pub mod export;
 pub mod exposure;
