@@ -27,14 +27,14 @@ const CURVED: f32 = 0.1;
 /// of the runs, in which all take turns; and for points of curved surfaces the distance along the normal to the triangles,
 /// and the angle between the exact normal and those of the triangles, interpolated and flat.
 ///
-/// Example: relight-lab curves oa_dm5 --subdivisions 4,1 -o out
+/// Example: relight-lab curves oa_dm5 --tessellations 4,1 -o out
 #[derive(Args, Debug)]
 pub struct CurvesArgs {
     #[command(flatten)]
     chosen: Maps,
     /// Values of r_subdivisions
     #[arg(long, value_name = "UNITS,…", value_delimiter = ',', default_value = "40,8,4,1,0.25", value_parser = crate::numbers::positive)]
-    subdivisions: Vec<f32>,
+    tessellations: Vec<f32>,
     /// Halvings of each exact piece along both sides before the hierarchy is built
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "0,1,2", value_parser = clap::value_parser!(u32).range(0..=4))]
     split: Vec<u32>,
@@ -150,7 +150,7 @@ fn measure(args: &CurvesArgs, bsp: &Bsp, map: &str) -> Result<()> {
         });
         println!("{line}");
         if let Some(folder) = &args.output {
-            let name = format!("{map} {}.png", variant.name).replace(' ', "-");
+            let name = format!("{map} {}.png", variant.name).replace([' ', ','], "-");
             picture(bsp, &variant.surfaces, &folder.join(name))?;
         }
     }
@@ -174,7 +174,7 @@ fn variants(args: &CurvesArgs, bsp: &Bsp, exact: &[Piece]) -> Vec<Variant> {
             Surfaces::Exact(Tree::new(&parts))
         })
     });
-    let of_facets = args.subdivisions.iter().map(|&subdivisions| {
+    let of_facets = args.tessellations.iter().map(|&subdivisions| {
         timed(format!("r_subdivisions {subdivisions}"), &|| {
             Surfaces::Facets(Tree::new(&facets(bsp, subdivisions)))
         })
