@@ -24,7 +24,7 @@ const CURVED: f32 = 0.1;
 ///
 /// Intersects rays on one core with the patches of a map as biquadratic Bézier surfaces and as triangles of several values
 /// of r_subdivisions, in hierarchies of one kind. Prints JSON, one object for each: surfaces, bytes, the median rays a second
-/// of the runs, in which all take turns; and for points of curved surfaces the distance along the normal to the triangles,
+/// of several turns; and for points of curved surfaces the distance along the normal to the triangles,
 /// and the angle between the exact normal and those of the triangles, interpolated and flat.
 ///
 /// Example: relight-lab curves oa_dm5 --tessellations 4,1 -o out
@@ -38,12 +38,12 @@ pub struct CurvesArgs {
     /// Halvings of each exact piece along both sides before the hierarchy is built
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "0,1,2", value_parser = clap::value_parser!(u32).range(0..=4))]
     split: Vec<u32>,
-    /// Rays of a run, and points
-    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = crate::numbers::count)]
-    rays: usize,
-    /// Number of runs
+    /// Number of rays, and of points of curves
+    #[arg(long, default_value_t = 100_000, value_parser = crate::numbers::count)]
+    points: usize,
+    /// Number of turns of each
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = crate::numbers::count)]
-    runs: usize,
+    turns: usize,
     /// Folder for pictures of the normals from the map's first view
     #[arg(short, long, value_name = "PATH")]
     output: Option<PathBuf>,
@@ -112,9 +112,9 @@ fn measure(args: &CurvesArgs, bsp: &Bsp, map: &str) -> Result<()> {
         curved.len()
     );
     let mut variants = variants(args, bsp, &exact);
-    let rays = rays_around(&exact, args.rays);
+    let rays = rays_around(&exact, args.points);
     let mut hits = vec![0usize; variants.len()];
-    for _ in 0..args.runs {
+    for _ in 0..args.turns {
         for (variant, hits) in variants.iter_mut().zip(&mut hits) {
             let begin = Instant::now();
             let surfaces = &variant.surfaces;
@@ -129,7 +129,7 @@ fn measure(args: &CurvesArgs, bsp: &Bsp, map: &str) -> Result<()> {
     for (variant, hits) in variants.iter_mut().zip(hits) {
         let (count, bytes) = variant.surfaces.size();
         variant.rates.sort_by(f64::total_cmp);
-        let mut errors = errors_along_normals(&curved, args.rays, |ray, limit| {
+        let mut errors = errors_along_normals(&curved, args.points, |ray, limit| {
             variant.surfaces.nearest(ray, limit)
         });
         let line = json!({
