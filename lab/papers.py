@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures the headline figures of the founding papers on this machine, and writes the tables of docs/src/how/papers.md.
+"""Measures the headline figures of the founding papers on this machine, and writes the tables of docs/src/how/papers*.md.
 
 usage: lab/papers.py --label NAME [options]   measures; writes lab/data/papers/NAME.json
        lab/papers.py --page [--check]         writes the tables of the page from lab/data/papers/*.json
@@ -21,7 +21,7 @@ from pathlib import Path
 LAB = Path(__file__).resolve().parent
 ROOT = LAB.parent
 DATA = LAB / "data" / "papers"
-PAGE = ROOT / "docs" / "src" / "how" / "papers.md"
+PAGES = [ROOT / "docs" / "src" / "how" / name for name in ["papers.md", "papers-cost.md"]]
 GAME = "/usr/share/games/openarena/baseoa"
 FILTERS = ("trace_gradient", "trace_temporal", "trace_wavelet", "trace_sparse", "trace_bounce_upsample")
 # The least time of a run on the GPU.
@@ -290,18 +290,18 @@ def table(row, runs):
 
 
 def page(check):
-    text = PAGE.read_text()
     runs = [json.loads(file.read_text()) for file in sorted(DATA.glob("*.json"))]
-    written = text
-    for row in ROWS:
-        begin, end = f"<!-- {row} -->\n", f"<!-- /{row} -->"
-        if begin in written:
-            before, rest = written.split(begin, 1)
-            written = before + begin + "\n" + table(row, runs) + "\n\n" + end + rest.split(end, 1)[1]
-    if check and written != text:
-        sys.exit(f"{PAGE.relative_to(ROOT)} differs from lab/data/papers: run lab/papers.py --page")
-    if not check:
-        PAGE.write_text(written)
+    for file in PAGES:
+        text = written = file.read_text()
+        for row in ROWS:
+            begin, end = f"<!-- {row} -->\n", f"<!-- /{row} -->"
+            if begin in written:
+                before, rest = written.split(begin, 1)
+                written = before + begin + "\n" + table(row, runs) + "\n\n" + end + rest.split(end, 1)[1]
+        if check and written != text:
+            sys.exit(f"{file.relative_to(ROOT)} differs from lab/data/papers: run lab/papers.py --page")
+        if not check:
+            file.write_text(written)
 
 
 def main():

@@ -211,6 +211,8 @@ pub struct TraceLook {
     pub(super) tracer: ViewTracer,
     /// Tracer of the right eye in stereo; each eye has its own history.
     right: Option<Box<ViewTracer>>,
+    /// Slope of the eye that was drawn first, while the other eye of the frame is not drawn.
+    first_eye: Option<f32>,
     passes: Arc<PassSet>,
     /// `rt_gridCells`.
     grid_cells: u32,
@@ -248,6 +250,7 @@ impl TraceLook {
         Ok(Self {
             tracer: view_tracer,
             right: None,
+            first_eye: None,
             passes: Arc::clone(passes),
             grid_cells,
             geometry,
@@ -345,8 +348,10 @@ impl TraceLook {
         } else {
             self.right.as_deref()
         };
+        let is_second = self.first_eye == Some(-slope) && slope != 0.0;
+        self.first_eye = (!is_second).then_some(slope);
         let shared = other
-            .filter(|_| slope != 0.0)
+            .filter(|_| is_second)
             .and_then(|other| other.for_other_eye(scene, settings));
         let tracer = if slope < 0.0 {
             match &mut self.right {
@@ -363,7 +368,7 @@ impl TraceLook {
             }
             &mut self.tracer
         };
-        tracer.take_other_eye(shared, scene);
+        tracer.other_eye = shared;
         let bit = |on: bool, bit: u32| if on { bit } else { 0 };
         tracer.channels = bit(mask.red, 1) | bit(mask.green, 2) | bit(mask.blue, 4);
         let view = TracedView {

@@ -112,7 +112,7 @@ pub struct ViewTracer {
     /// Dynamic lights of the last frame.
     dynamic_lights: Vec<DynamicLight>,
     /// Light of the other eye, drawn before in this frame.
-    other_eye: Option<OtherEye>,
+    pub(super) other_eye: Option<OtherEye>,
     /// Hash of the content of the accumulated frames, and their number.
     accumulated: (u64, u32),
     /// Number of next frames that join the mean whatever their content.
@@ -228,12 +228,6 @@ impl ViewTracer {
             .light()
             .filter(|_| same && self.last_time == view.time);
         light.map(|light| light.converging(camera.stereo.distance))
-    }
-
-    /// Takes over the light of the other eye for the next frame, unless the game is paused: both eyes would then blur
-    /// each other's light more and more.
-    pub fn take_other_eye(&mut self, light: Option<OtherEye>, view: &TracedScene) {
-        self.other_eye = light.filter(|_| self.last_time != view.time);
     }
 
     /// Discards accumulated frames and light samples: lights have changed.

@@ -296,12 +296,9 @@ impl Gpu {
         let mut right = ViewTracer::new(&self.passes).expect("a device");
         right.count_rays = true;
         let mut seen = Vec::new();
-        for frame in 0..frames {
+        for _ in 0..frames {
             let mut views = [Eye::Left, Eye::Right].map(|eye| {
                 let mut view = scene.view();
-                // accumulated frames show one time
-                let time = if settings.rt_accumulate { 0 } else { frame };
-                view.time = 0.02 * time as f32;
                 view.view = View::new(&view.def, 4.0, 10000.0).with_stereo(eye.stereo(settings));
                 view
             });
@@ -318,7 +315,7 @@ impl Gpu {
                 settings,
                 &target,
             );
-            right.take_other_eye(self.look.for_other_eye(second, settings), second);
+            right.other_eye = self.look.for_other_eye(second, settings);
             record(&mut right, &mut rec, &uploaded, second, settings, &target);
             self.ring.end(rec).expect("submitted");
             self.device.wait_idle().expect("done");
