@@ -166,13 +166,13 @@ fn frames_with_a_lens_are_traced(gpu: &mut Gpu) {
         ..middles(reference())
     };
     for settings in [lens, reference()] {
-        let [traced, asked] = [false, true].map(|rt_first_hits| {
+        let [traced, drawn] = [false, true].map(|rt_first_hits| {
             let settings = Settings {
                 rt_first_hits,
                 ..settings.clone()
             };
             gpu.render(&scene, &settings, 2).0
         });
-        assert_eq!(traced, asked);
+        assert_eq!(traced, drawn);
     }
 }
