@@ -267,19 +267,24 @@ pub fn draw(
     Ok(renderer.end_frame()?)
 }
 
+/// A model at a place, not turned.
+pub fn placed(model: i32, origin: Vec3) -> RefEntity {
+    RefEntity {
+        model,
+        axis: [Vec3::X, Vec3::Y, Vec3::Z],
+        origin,
+        old_origin: origin,
+        shader_rgba: [255; 4],
+        ..RefEntity::default()
+    }
+}
+
 /// Entities that the game would add to every view: the map's inline models at rest, and the marks of its mirrors.
 fn map_entities(renderer: &mut Renderer, bsp: &Bsp) -> Vec<RefEntity> {
     let mut entities = Vec::new();
-    let axis = [Vec3::X, Vec3::Y, Vec3::Z];
     for entity in bsp.entities() {
         let origin = entity.vec3("origin").unwrap_or(Vec3::ZERO);
-        let base = RefEntity {
-            axis,
-            origin,
-            old_origin: origin,
-            shader_rgba: [255; 4],
-            ..RefEntity::default()
-        };
+        let base = placed(0, origin);
         match entity.get("model") {
             Some(name) if name.starts_with('*') && name != "*0" => {
                 let model = renderer.register_model(name);

@@ -183,7 +183,7 @@ settings! { variables {
     rt_first_hits: bool = "rt_firstHits", "0", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "1 finds the first surface of each pixel by the rasterizer in place of rays; not with rt_dof, nor with smooth edges of rt_accumulate.";
     rt_denoiser: DenoiserChoice = "rt_denoiser", "1", ARCHIVE, kept(0.0, 2.0), Frame, GoesOn, "Filter for traced light: 0 none, 1 A-SVGF, 2 a cheaper sparse filter.";
     rt_taa: bool = "rt_taa", "1", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 smooths edges over time.";
-    rt_taa_rays: u32 = "rt_taaRays", "0", ARCHIVE, kept(0.0, 8.0), Frame, GoesOn, "More rays of each pixel of which rt_taa has no history; 0 none.";
+    rt_taa_rays: u32 = "rt_taaRays", "0", ARCHIVE, kept(0.0, 8.0), Frame, GoesOn, "More rays for each pixel without a history in rt_taa; 0 none.";
     rt_taa_maximum: f32 = "rt_taaMaximum", "0", ARCHIVE, kept(0.0, 0.98), Frame, GoesOn, "Smooths the greatest luminance of rt_taa's colour range over time: weight of the last frame's; 0 takes each frame's own.";
     rt_scale: f32 = "rt_scale", "1", ARCHIVE, kept(0.25, 1.0), Frame, GoesOn, "Width and height of the traced picture over those of the window.";
     rt_sharpness: f32 = "rt_sharpness", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "Sharpens the picture of rt_taa or rt_scale: 0 none, 1 most.";

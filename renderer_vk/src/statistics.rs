@@ -123,7 +123,7 @@ pub struct LightCost {
     pub tree_bytes: Option<u64>,
 }
 
-/// Cost of the structures of what moves in traced views, summed over frames.
+/// Cost of the acceleration structures of moving bodies in traced views, summed over frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct MovingCost {
     /// Frames.
@@ -210,7 +210,7 @@ pub struct Costs {
     pub reserved: u64,
     /// From input to picture, in a window.
     pub latency: Option<Latency>,
-    /// Structures of what moves, if hits are counted.
+    /// Acceleration structures of moving bodies, if hits are counted.
     pub moving: Option<MovingCost>,
 }
 

@@ -73,7 +73,7 @@ float layer_start(LayerOrder last) { return max(last.key - 0.01, 0.0); }
 // 1: rays of scattered light may meet cut-outs without a test of their alpha (`rt_cutouts`).
 layout(constant_id = 13) const uint CUT_OUTS = 0;
 
-// How the current ray meets cut-outs: CUT_OUTS_*, of which CUT_OUTS_SKIPPED takes those of known coverage as solid; or
+// How the current ray meets cut-outs: CUT_OUTS_*. CUT_OUTS_SKIPPED takes those of known coverage as solid; or
 // CUT_OUTS_OPEN: it passes these.
 uint ray_cut_outs = CUT_OUTS_TESTED;
 const uint CUT_OUTS_OPEN = 4;

@@ -23,7 +23,7 @@ use crate::pictures::write_whole;
 use crate::render::parse_size;
 use crate::settings::SettingArgs;
 use crate::timings::Timings;
-use crate::view::{Camera, draw, load, map_name, open};
+use crate::view::{Camera, draw, load, map_name, open, placed};
 
 /// Measure the structures of bodies: refits saved by the feedback of rays, milliseconds, bytes, differing pixels
 ///
@@ -304,7 +304,7 @@ fn begin(stage: &mut Stage<'_>, settings: &Settings) -> Result<()> {
     let first = stage.entities.len();
     let bodies = places.iter().enumerate().map(|(number, place)| {
         let of = usize::from(number >= animated);
-        model::entity(models[of], *place)
+        placed(models[of], *place)
     });
     stage.entities.extend(bodies);
     stage.animated = first..first + animated.min(places.len());

@@ -113,7 +113,7 @@ impl Renderer {
         self.trace.as_ref().map(TraceLook::structure_cost)
     }
 
-    /// Cost of the structures of what moves, summed over frames; `None` without the traced look.
+    /// Cost of the acceleration structures of moving bodies, summed over frames; `None` without the traced look.
     pub fn moving_cost(&self) -> Option<MovingCost> {
         self.trace.as_ref().map(TraceLook::moving_cost)
     }

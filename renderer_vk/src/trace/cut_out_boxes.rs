@@ -63,7 +63,7 @@ fn records(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Vec<CutOut
         }
     }
     let size = |member: &Member<'_>| (member.bounds.maxs - member.bounds.mins).length();
-    // the largest first, of which others are parts
+    // the largest first: smaller ones join its box
     members.sort_by(|a, b| size(b).total_cmp(&size(a)));
     let mut things: Vec<(u32, u32, Aabb, Aabb)> = Vec::new();
     let mut places = Vec::with_capacity(members.len());

@@ -439,7 +439,7 @@ impl TraceLook {
         self.geometry.cost
     }
 
-    /// Cost of the structures of what moves, summed over frames.
+    /// Cost of the acceleration structures of moving bodies, summed over frames.
     pub fn moving_cost(&self) -> MovingCost {
         self.tracer.moving_cost()
     }

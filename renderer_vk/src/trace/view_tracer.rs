@@ -42,7 +42,7 @@ use crate::statistics::MovingCost;
 use crate::stereo::Stereo;
 use crate::world::outside;
 use content::content_hash;
-use parameters::{Prepared, camera_frame, portal_record, stereo_camera};
+use parameters::{Prepared, camera_frame, flashlight_camera, portal_record, stereo_camera};
 
 /// The map that a view shows.
 #[derive(Clone, Copy)]
@@ -109,8 +109,8 @@ pub struct ViewTracer {
     last_time: f32,
     /// Camera of the last frame, if its light is valid history.
     pub(super) history: Option<CameraView>,
-    /// Dynamic lights of the last frame.
-    dynamic_lights: Vec<DynamicLight>,
+    /// Dynamic lights of the last frame, and the camera that its flashlight was at.
+    dynamic_lights: (Vec<DynamicLight>, Option<CameraView>),
     /// Light of the other eye, drawn before in this frame.
     pub(super) other_eye: Option<OtherEye>,
     /// Hash of the content of the accumulated frames, and their number.
@@ -165,7 +165,7 @@ impl ViewTracer {
             frame: 0,
             last_time: 0.0,
             history: None,
-            dynamic_lights: Vec::new(),
+            dynamic_lights: (Vec::new(), None),
             other_eye: None,
             accumulated: (0, 0),
             joining: 0,
@@ -184,7 +184,7 @@ impl ViewTracer {
         Some(self.antialias.picture().unwrap_or(targets.picture()))
     }
 
-    /// Cost of the structures of what moves, summed over frames.
+    /// Cost of the acceleration structures of moving bodies, summed over frames.
     pub fn moving_cost(&self) -> MovingCost {
         self.accel.cost().with_feedback(self.feedback.cost)
     }
@@ -302,7 +302,8 @@ impl ViewTracer {
         self.frame = self.frame.wrapping_add(1);
         self.last_time = view.scene.time;
         self.history = (!settings.rt_accumulate).then(|| camera_frame(view.scene));
-        (self.dynamic_lights).clone_from(&view.scene.dlights);
+        (self.dynamic_lights.0).clone_from(&view.scene.dlights);
+        self.dynamic_lights.1 = flashlight_camera(view.scene, settings);
         self.denoiser.advance();
         self.reservoirs.advance();
         self.fog.advance();

@@ -109,18 +109,6 @@ pub fn places(bsp: &Bsp, count: usize) -> Vec<Vec3> {
     open.take(count).collect()
 }
 
-/// A body at a place.
-pub fn entity(model: i32, origin: Vec3) -> RefEntity {
-    RefEntity {
-        model,
-        axis: [Vec3::X, Vec3::Y, Vec3::Z],
-        origin,
-        old_origin: origin,
-        shader_rgba: [255; 4],
-        ..RefEntity::default()
-    }
-}
-
 /// Moves body `number` to its key frames in frame `time`.
 pub fn animate(body: &mut RefEntity, number: usize, time: usize) {
     let frames = FRAMES as i32;

@@ -8,7 +8,7 @@ use q3bsp::{DrawVert, ShaderId, content_flags};
 use relight::{FileError, MemoryFiles};
 use renderer_vk::api::RefEntity;
 
-use crate::view::Camera;
+use crate::view::{Camera, placed};
 
 /// Game path of the map.
 pub const MAP: &str = "maps/growth.bsp";
@@ -363,14 +363,7 @@ pub fn entities(count: usize, model: i32) -> impl Iterator<Item = RefEntity> {
         let at = [number % side, number / side % side, number / side / side];
         let part = Vec3::from_array(at.map(|n| (n as f32 + 0.5) / side as f32));
         let origin = LOW + 50.0 + inner * part;
-        RefEntity {
-            model,
-            axis: [Vec3::X, Vec3::Y, Vec3::Z],
-            origin,
-            old_origin: origin,
-            shader_rgba: [255; 4],
-            ..RefEntity::default()
-        }
+        placed(model, origin)
     })
 }
 

@@ -116,7 +116,8 @@ impl ViewTracer {
     /// Samples of bounced light that a history needs. Whether dynamic lights have changed is known before a ray finds it:
     /// then every cell gathers, so that their bounced light does not lag.
     fn bounce_samples(&self, view: &TracedScene, settings: &Settings) -> f32 {
-        if self.dynamic_lights == view.dlights {
+        let (lights, flashlight) = &self.dynamic_lights;
+        if *lights == view.dlights && *flashlight == flashlight_camera(view, settings) {
             settings.rt_bounce_adaptive as f32
         } else {
             f32::MAX
@@ -343,6 +344,11 @@ fn mirror_count(map: &TracedMap<'_>, view: &TracedScene, settings: &Settings) ->
 /// The camera of a view, as two frames must share it to show equal directions.
 pub(super) fn camera_frame(view: &TracedScene) -> CameraView {
     stereo_camera(&view.view, view.view.stereo)
+}
+
+/// The camera that the flashlight moves with, if it is on.
+pub(super) fn flashlight_camera(view: &TracedScene, settings: &Settings) -> Option<CameraView> {
+    settings.rt_flashlight.then(|| camera_frame(view))
 }
 
 /// The same with another stereo offset.

@@ -233,13 +233,7 @@ impl Gpu {
         mut watch: Option<&mut dyn FnMut(u32, &[Vec3])>,
     ) -> (Vec<Vec3>, Vec<[u8; 4]>) {
         let uploaded = scene.upload(&self.device, self.tracer);
-        let [width, height] = [scene.def.width as u32, scene.def.height as u32];
-        let usage = ImageUsage::STORAGE | ImageUsage::COLOR;
-        let target = Image::new(
-            &self.device,
-            &ImageDesc::new("test target", width, height, Format::Rgba8, usage),
-        )
-        .expect("target");
+        let target = self.target(scene);
         let mut view = scene.view();
         for frame in 0..frames {
             change(frame, &mut view);
@@ -286,13 +280,7 @@ impl Gpu {
         forgets: bool,
     ) -> Vec<(Vec<Vec3>, u64)> {
         let uploaded = scene.upload(&self.device, self.tracer);
-        let [width, height] = [scene.def.width as u32, scene.def.height as u32];
-        let usage = ImageUsage::STORAGE | ImageUsage::COLOR;
-        let target = Image::new(
-            &self.device,
-            &ImageDesc::new("test target", width, height, Format::Rgba8, usage),
-        )
-        .expect("target");
+        let target = self.target(scene);
         let mut right = ViewTracer::new(&self.passes).expect("a device");
         right.count_rays = true;
         let mut seen = Vec::new();
@@ -327,6 +315,17 @@ impl Gpu {
         self.check_messages();
         self.look.reset();
         seen
+    }
+
+    /// The image for a scene's picture.
+    fn target(&self, scene: &Scene) -> Image {
+        let [width, height] = [scene.def.width as u32, scene.def.height as u32];
+        let usage = ImageUsage::STORAGE | ImageUsage::COLOR;
+        Image::new(
+            &self.device,
+            &ImageDesc::new("test target", width, height, Format::Rgba8, usage),
+        )
+        .expect("target")
     }
 
     /// The picture of a tracer's last frame before exposure.
