@@ -1,5 +1,6 @@
 //! Map conversion: a map, its materials and its images become a relit world.
 //!
+//! * [`bake`]: light of a world's sources, written into its map.
 //! * [`mod@calibrate`]: fits lights to the lightmaps and places those that the compiler stripped.
 //! * [`compare`]: image comparison.
 //! * [`emitters`]: light sources in physical units.
@@ -31,6 +32,7 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic)
 )]
 
+pub mod bake;
 mod cache;
 pub mod calibrate;
 pub mod compare;
