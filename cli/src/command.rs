@@ -7,7 +7,8 @@ use clap::{Parser, Subcommand};
 
 use crate::outcome::parse;
 use crate::{
-    calibration, cameras, compare, convert, info, lights, material, render, report, sample, viewer,
+    bake, calibration, cameras, compare, convert, info, lights, material, render, report, sample,
+    viewer,
 };
 
 /// Maps of id Tech 3 games: contents, conversion, pictures with new light
@@ -21,6 +22,7 @@ pub struct Cli {
 // No documentation comments on the variants: clap would show them in place of the descriptions of the arguments.
 #[derive(Subcommand, Debug)]
 enum Command {
+    Bake(bake::BakeArgs),
     Calibration(calibration::CalibrationArgs),
     Cameras(cameras::CamerasArgs),
     Compare(compare::CompareArgs),
@@ -57,6 +59,7 @@ const REPLACED: [(&str, &str, &str); 13] = [
 /// Those of the subcommand.
 pub fn run() -> Result<ExitCode> {
     match parse::<Cli>(&REPLACED).command {
+        Command::Bake(args) => bake::run(&args),
         Command::Calibration(args) => calibration::run(&args),
         Command::Cameras(args) => cameras::run(&args),
         Command::Compare(args) => compare::run(&args),

@@ -5,6 +5,7 @@
 
 #![forbid(unsafe_code)]
 
+mod bake;
 mod beside;
 mod brought;
 mod calibration;

@@ -36,6 +36,15 @@ impl Bsp {
     /// The layout of the light grid, from the bounds of the world model and the world's `gridsize`.
     /// `None` when there is no grid or its length does not fit the layout; the engine then ignores it.
     pub fn light_grid(&self) -> Option<LightGridLayout> {
+        let layout = self.light_grid_layout(self.light_grid.len())?;
+        let rest = self.container.trailing.get(Lump::LightGrid.index());
+        let whole = rest.is_none_or(Vec::is_empty);
+        (layout.points() == self.light_grid.len() && whole).then_some(layout)
+    }
+
+    /// The layout that the engine expects of a light grid, whether the map has one or not. `None` if it has more than
+    /// `most` points or bounds that are not finite.
+    pub fn light_grid_layout(&self, most: usize) -> Option<LightGridLayout> {
         let world = self.models.first()?;
         let size = self
             .entities()
@@ -49,26 +58,29 @@ impl Bsp {
         let mut counts = [0; 3];
         for (count, span) in counts.iter_mut().zip(spans.to_array()) {
             // Catches NaN too; no grid that fits a file has more points on an axis.
-            if !(span >= 1.0 && span <= self.light_grid.len() as f32) {
+            if !(span >= 1.0 && span <= most as f32) {
                 return None;
             }
             *count = span as usize;
         }
-        let total = counts
-            .iter()
-            .try_fold(1usize, |total, &count| total.checked_mul(count))?;
-        let rest = self.container.trailing.get(Lump::LightGrid.index());
-        let whole = rest.is_none_or(Vec::is_empty);
-        let finite = origin.is_finite() && size.is_finite();
-        (total == self.light_grid.len() && whole && finite).then_some(LightGridLayout {
+        let layout = LightGridLayout {
             origin,
             size,
             counts,
-        })
+        };
+        let total = counts
+            .iter()
+            .try_fold(1usize, |total, &count| total.checked_mul(count))?;
+        (total <= most && origin.is_finite() && size.is_finite()).then_some(layout)
     }
 }
 
 impl LightGridLayout {
+    /// Number of points.
+    pub fn points(&self) -> usize {
+        self.counts.iter().product()
+    }
+
     /// Index of the point at cell coordinates, if it exists.
     pub fn index(&self, x: usize, y: usize, z: usize) -> Option<usize> {
         let [nx, ny, nz] = self.counts;

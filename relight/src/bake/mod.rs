@@ -1,5 +1,409 @@
 //! Baking: light of a world's sources, written into the lightmaps, vertex colours and light grid of its map.
+//!
+//! 1. `targets` finds the places where a map stores light, and the points that stand for them: for a texel a pattern of
+//!    points on the triangles that cover it (`coverage`), for a vertex one.
+//! 2. A [`Gather`] computes direct light at all points: [`Rays`] on the CPU, or a GPU by the renderer.
+//! 3. Bounces: each gathers at one point of every place the light that surfaces reflect, lit by the bounce before
+//!    ([`LitSurfaces`]). The reflected light of a texel is smoothed over its neighbours on the same surface.
+//! 4. `grid` computes the light grid.
+//! 5. [`Baked::store`] encodes the light ([`Encoding`]) and changes the map's lumps of light, nothing else.
+//!
+//! Light is irradiance over π: the outgoing radiance of a white surface, in display units ([`emitters`](crate::emitters)).
 
+mod coverage;
+mod encode;
 mod gather;
+mod grid;
+mod rays;
+mod smooth;
+mod store;
+mod targets;
+#[cfg(test)]
+mod tests;
 
+pub use encode::Encoding;
 pub use gather::{Gather, GatherError, GatherProgress, Light, LitSurfaces, LitTriangle, Point};
+pub use rays::Rays;
+pub use store::Stored;
+
+use crate::calibrate::Dirt;
+use crate::occluders::Occluders;
+use crate::world::{RelitWorld, WorldMaterial};
+use glam::Vec3;
+use q3bsp::GridPoint;
+use std::ops::Range;
+use support::parallel;
+use support::slice::{item, part};
+use targets::Targets;
+
+/// Texels around a covered one that filtering may read.
+const RINGS: usize = 2;
+
+/// What part of light surfaces reflect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Reflectance {
+    /// Their mean albedo, as the tracer has it: lights that calibration has found are fitted with this.
+    #[default]
+    Albedo,
+    /// 0.55 of the mean of their display-encoded image, as q3map2 has it.
+    Compiler,
+}
+
+/// Part of display-encoded texture colour that q3map2's bounces reflect: 500 × 0.375 × 3 × 0.25 / 255.
+const COMPILER_REFLECTANCE: f32 = 0.5515;
+
+/// What is baked, and how well.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BakeOptions {
+    /// Points along each side of a texel, 1 to 8.
+    pub pattern: u32,
+    /// Shadow rays to each light from a point; 0 for one to its middle.
+    pub samples: u32,
+    /// Diffuse bounces.
+    pub bounces: u32,
+    /// Rays from a place that gather a bounce.
+    pub rays: u32,
+    /// What surfaces reflect.
+    pub reflectance: Reflectance,
+    /// Ambient occlusion of all light, if any.
+    pub dirt: Option<Dirt>,
+    /// Least light of texels, vertices and points of the grid, irradiance over π.
+    pub least: [Vec3; 3],
+    /// Whether the light grid is computed.
+    pub grid: bool,
+    /// How light becomes bytes.
+    pub encoding: Encoding,
+}
+
+impl BakeOptions {
+    /// Options that reproduce what a calibrated world was fitted to; else those for a map's directives.
+    pub fn of(world: &RelitWorld) -> BakeOptions {
+        let calibrated = world.calibration.is_some();
+        BakeOptions {
+            pattern: 2,
+            samples: 4,
+            bounces: if calibrated { 1 } else { 8 },
+            rays: 64,
+            reflectance: match calibrated {
+                true => Reflectance::Albedo,
+                false => Reflectance::Compiler,
+            },
+            dirt: crate::calibrate::dirt_of_calibrated(world),
+            least: [Vec3::ZERO; 3],
+            grid: true,
+            encoding: Encoding::of(world),
+        }
+    }
+}
+
+/// A stage of a bake.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BakeStage {
+    /// Direct light.
+    Direct,
+    /// A bounce, counted from 1.
+    Bounce(u32),
+    /// Ambient occlusion.
+    Dirt,
+    /// The light grid.
+    Grid,
+}
+
+/// Gets the stage and its completed part, 0 to 1.
+pub type BakeProgress<'a> = &'a mut dyn FnMut(BakeStage, f32);
+
+/// Light of one page.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BakedPage {
+    /// Number, as [`RelitWorld::page`] counts.
+    pub number: usize,
+    /// Texels per side.
+    pub side: usize,
+    /// For each texel the surface whose light it has, or `u32::MAX`.
+    pub owners: Vec<u32>,
+    /// Light of each texel.
+    pub light: Vec<Light>,
+}
+
+/// Light of a map.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Baked {
+    /// Pages that surfaces use.
+    pub pages: Vec<BakedPage>,
+    /// Index into the map's vertices, its surface, and light of the vertices of surfaces that are lit by vertex.
+    pub vertices: Vec<(u32, u32, Vec3)>,
+    /// Light grid; `None` for a map that can have none, or if none was wanted.
+    pub grid: Option<Vec<GridPoint>>,
+    /// Texels and vertices without light, because everything near them is solid.
+    pub unlit: usize,
+}
+
+/// Computes the light of a map.
+///
+/// # Errors
+/// Those of `gather`.
+pub fn bake(
+    world: &RelitWorld,
+    gather: &mut dyn Gather,
+    options: &BakeOptions,
+    progress: BakeProgress<'_>,
+) -> Result<Baked, GatherError> {
+    let occluders = Occluders::of_world(world);
+    let targets = Targets::of(world, &occluders, options.pattern);
+    let direct = gather.direct(&targets.points, options.samples, &mut |part| {
+        progress(BakeStage::Direct, part);
+    })?;
+    let mut places = Places::of(&targets, |points| mean(part(&direct, points)));
+    bounce(world, &targets, &mut places, gather, options, progress)?;
+    for light in &mut places.all {
+        light.value += world.ambient;
+    }
+    if let Some(dirt) = options.dirt {
+        progress(BakeStage::Dirt, 0.0);
+        places.darken(&targets, |point| {
+            dirt.part_stored(&occluders, point.position, point.normal)
+        });
+        progress(BakeStage::Dirt, 1.0);
+    }
+    let grid = match options.grid {
+        true => grid::bake(
+            world,
+            gather,
+            options.samples,
+            options.encoding,
+            (world.ambient, options.least[2]),
+            &mut |part| progress(BakeStage::Grid, part),
+        )?,
+        false => None,
+    };
+    Ok(places.finish(&targets, options, grid))
+}
+
+/// Mean light of points.
+fn mean(points: &[Light]) -> Light {
+    let mut sum = Light::default();
+    for light in points {
+        sum += *light;
+    }
+    sum * (1.0 / points.len().max(1) as f32)
+}
+
+/// Adds the bounces to the light of all places.
+fn bounce(
+    world: &RelitWorld,
+    targets: &Targets,
+    places: &mut Places,
+    gather: &mut dyn Gather,
+    options: &BakeOptions,
+    progress: BakeProgress<'_>,
+) -> Result<(), GatherError> {
+    if options.bounces == 0 {
+        return Ok(());
+    }
+    let reflectances = reflectances(world, options.reflectance);
+    let firsts = Places::first_points(targets);
+    let points: Vec<Point> = firsts
+        .iter()
+        .map(|&i| item_or(&targets.points, i))
+        .collect();
+    let mut last = places.clone();
+    for number in 1..=options.bounces {
+        last.fill(targets);
+        let light: Vec<Vec3> = last.all.iter().map(|light| light.value).collect();
+        let lit = LitSurfaces {
+            triangles: &targets.lit,
+            reflectances: &reflectances,
+            light: &light,
+        };
+        let reflected = gather.reflected(&points, lit, options.rays, &mut |part| {
+            progress(BakeStage::Bounce(number), part);
+        })?;
+        let mut found = reflected.iter().copied();
+        last = Places::of(targets, |points| match points.is_empty() {
+            true => Light::default(),
+            false => found.next().unwrap_or_default(),
+        });
+        last.smooth(world, targets);
+        for (sum, more) in places.all.iter_mut().zip(&last.all) {
+            *sum += *more;
+        }
+    }
+    Ok(())
+}
+
+/// An item, or a point that nothing reaches.
+fn item_or(points: &[Point], index: u32) -> Point {
+    let none = Point {
+        position: Vec3::ZERO,
+        normal: Vec3::Z,
+    };
+    points.get(index as usize).copied().unwrap_or(none)
+}
+
+/// What each triangle reflects.
+fn reflectances(world: &RelitWorld, kind: Reflectance) -> Vec<Vec3> {
+    let of_material = |material: &WorldMaterial| match kind {
+        _ if material.is_sky() => Vec3::ZERO,
+        Reflectance::Albedo => material.albedo,
+        Reflectance::Compiler => {
+            let shades = &material.shades;
+            let sum: Vec3 = shades.iter().map(|shade| shade.encoded).sum();
+            sum * (COMPILER_REFLECTANCE / shades.len().max(1) as f32)
+        }
+    };
+    let of_materials: Vec<Vec3> = world.materials.iter().map(of_material).collect();
+    let mut all = vec![Vec3::ZERO; world.indices.len() / 3];
+    for surface in &world.surfaces {
+        let value = item(&of_materials, surface.material as usize);
+        support::slice::part_mut(&mut all, surface.triangles()).fill(value);
+    }
+    all
+}
+
+/// Light of all places: texels of all pages, then the world's vertices; and of the vertices that store light.
+#[derive(Clone)]
+struct Places {
+    all: Vec<Light>,
+    /// Light of [`Targets::vertices`].
+    vertices: Vec<Light>,
+    /// For each texel the surface that covers it, or `u32::MAX`.
+    owners: Vec<u32>,
+}
+
+impl Places {
+    /// Calls `light` with the points of each covered texel, and then of each vertex.
+    fn of(targets: &Targets, mut light: impl FnMut(Range<usize>) -> Light) -> Places {
+        let mut places = Places {
+            all: vec![Light::default(); targets.places],
+            vertices: Vec::with_capacity(targets.vertices.len()),
+            owners: vec![u32::MAX; targets.texels],
+        };
+        let range = |points: &Range<u32>| points.start as usize..points.end as usize;
+        for page in &targets.pages {
+            for texel in &page.texels {
+                let at = page.first + texel.at as usize;
+                let found = light(range(&texel.points));
+                if let (Some(slot), Some(owner)) =
+                    (places.all.get_mut(at), places.owners.get_mut(at))
+                    && !texel.points.is_empty()
+                {
+                    *slot = found;
+                    *owner = texel.surface;
+                }
+            }
+        }
+        for vertex in &targets.vertices {
+            let found = light(range(&vertex.points));
+            places.vertices.push(found);
+            places.spread_vertex(targets, vertex, found);
+        }
+        places
+    }
+
+    /// Sets the light of a drawn vertex.
+    fn spread_vertex(&mut self, targets: &Targets, vertex: &targets::Vertex, light: Light) {
+        let drawn = vertex.drawn.map(|drawn| targets.texels + drawn as usize);
+        if let Some(slot) = drawn.and_then(|at| self.all.get_mut(at)) {
+            *slot = light;
+        }
+    }
+
+    /// The first point of each place that has some, in the order of [`Places::of`].
+    fn first_points(targets: &Targets) -> Vec<u32> {
+        let texels = targets.pages.iter().flat_map(|page| &page.texels);
+        let vertices = targets.vertices.iter().map(|vertex| &vertex.points);
+        texels
+            .map(|texel| &texel.points)
+            .chain(vertices)
+            .filter(|points| !points.is_empty())
+            .map(|points| points.start)
+            .collect()
+    }
+
+    /// Gives texels around the covered ones light.
+    fn fill(&mut self, targets: &Targets) {
+        for page in &targets.pages {
+            let range = page.first..page.first + page.side * page.side;
+            if let (Some(owners), Some(light)) =
+                (self.owners.get_mut(range.clone()), self.all.get_mut(range))
+            {
+                coverage::fill(page.side, RINGS, owners, light, mean);
+            }
+        }
+    }
+
+    /// Smooths the light of texels over their neighbours on the same plane.
+    fn smooth(&mut self, world: &RelitWorld, targets: &Targets) {
+        for page in &targets.pages {
+            let range = page.first..page.first + page.side * page.side;
+            if let (Some(owners), Some(light)) =
+                (self.owners.get(range.clone()), self.all.get_mut(range))
+            {
+                smooth::smooth(world, page.side, owners, light);
+            }
+        }
+    }
+
+    /// Multiplies the light of each place by a factor of its first point.
+    fn darken(&mut self, targets: &Targets, factor: impl Fn(&Point) -> f32 + Sync) {
+        let firsts = Places::first_points(targets);
+        let factors = parallel::map(&firsts, |_, &i| factor(&item_or(&targets.points, i)));
+        let mut factors = factors.into_iter();
+        let of_places = Places::of(targets, |points| match points.is_empty() {
+            true => Light::default(),
+            false => Light {
+                value: Vec3::splat(factors.next().unwrap_or(1.0)),
+                towards: Vec3::ZERO,
+            },
+        });
+        let all = self.all.iter_mut().zip(&of_places.all);
+        let vertices = self.vertices.iter_mut().zip(&of_places.vertices);
+        for (light, factor) in all.chain(vertices) {
+            *light = *light * factor.value.x;
+        }
+    }
+
+    fn finish(
+        mut self,
+        targets: &Targets,
+        options: &BakeOptions,
+        grid: Option<Vec<GridPoint>>,
+    ) -> Baked {
+        let lit = self
+            .owners
+            .iter()
+            .filter(|owner| **owner != u32::MAX)
+            .count();
+        let covered: usize = targets.pages.iter().map(|page| page.texels.len()).sum();
+        let dark = targets
+            .vertices
+            .iter()
+            .filter(|v| v.points.is_empty())
+            .count();
+        self.fill(targets);
+        let [texel, vertex, _] = options.least;
+        let pages = targets.pages.iter().map(|page| {
+            let range = page.first..page.first + page.side * page.side;
+            let mut light = part(&self.all, range.clone()).to_vec();
+            for light in &mut light {
+                light.value = light.value.max(texel);
+            }
+            BakedPage {
+                number: page.number,
+                side: page.side,
+                owners: part(&self.owners, range).to_vec(),
+                light,
+            }
+        });
+        let vertices = targets.vertices.iter().zip(&self.vertices);
+        let vertices = vertices
+            .filter(|(target, _)| !target.points.is_empty())
+            .map(|(target, light)| (target.vertex, target.surface, light.value.max(vertex)));
+        Baked {
+            pages: pages.collect(),
+            vertices: vertices.collect(),
+            grid,
+            unlit: covered - lit + dark,
+        }
+    }
+}

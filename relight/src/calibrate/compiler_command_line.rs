@@ -34,7 +34,7 @@ pub(super) struct CommandLine {
 
 /// Ambient occlusion by which the compiler multiplies all light of a texel.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Dirt {
+pub struct Dirt {
     /// Distance within which surfaces occlude, id units.
     depth: f32,
     /// Exponent of the occlusion.
@@ -75,7 +75,7 @@ pub(super) fn command_line(entities: &[Entity]) -> Option<CommandLine> {
 }
 
 /// The dirt of a calibrated map, if calibration found dirt.
-pub(super) fn dirt_of_calibrated(world: &RelitWorld) -> Option<Dirt> {
+pub(crate) fn dirt_of_calibrated(world: &RelitWorld) -> Option<Dirt> {
     let report = world.calibration.as_ref()?;
     report.dirty.then(|| dirt(&world.bsp.entities()))
 }
@@ -96,7 +96,7 @@ impl Dirt {
     };
 
     /// Part of the light at a position that was stored, 0.1 to 1.
-    pub fn part_stored(&self, occluders: &Occluders, position: Vec3, normal: Vec3) -> f32 {
+    pub(crate) fn part_stored(&self, occluders: &Occluders, position: Vec3, normal: Vec3) -> f32 {
         let (u, v) = normal.any_orthonormal_pair();
         let (angles, count) = DIRT_RINGS;
         let around = angles.into_iter().flat_map(|angle| {

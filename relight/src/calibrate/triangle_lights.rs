@@ -169,6 +169,20 @@ pub(crate) fn lambert(position: Vec3, normal: Vec3, light: &TriangleLight) -> f3
     (sum.abs() / 2.0).min(TAU / 2.0)
 }
 
+/// Solid angle of a triangle light at a position, sr; 0 behind it, unless it is two-sided.
+///
+/// Source: Van Oosterom and Strackee, The Solid Angle of a Plane Triangle, IEEE TBME 1983.
+pub(crate) fn solid_angle(position: Vec3, light: &TriangleLight) -> f32 {
+    let [a, b, c] = light.vertices.map(|v| v - position);
+    if (b - a).cross(c - a).dot(a) >= 0.0 && !light.two_sided {
+        return 0.0;
+    }
+    let [la, lb, lc] = [a, b, c].map(Vec3::length);
+    let above = a.dot(b.cross(c));
+    let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+    2.0 * above.abs().atan2(below)
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::samples::Site;

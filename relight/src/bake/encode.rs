@@ -1,0 +1,109 @@
+//! Light to the bytes that maps store.
+
+use crate::emitters::raise;
+use crate::world::RelitWorld;
+use glam::Vec3;
+
+/// Overbright factor of stored light: a byte of 255 shows light of this value on white.
+const OVERBRIGHT: f32 = 4.0;
+
+/// How light becomes bytes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Encoding {
+    /// Light of a byte of 255, irradiance over π.
+    pub full: f32,
+    /// Gamma g: light v gives a byte of 255 (v / full)^(1 / g).
+    pub gamma: f32,
+    /// Divisor of the value after gamma: q3map2's `-compensate`, for engines without overbright bits.
+    pub compensate: f32,
+    /// Exponent that ratios of the channels were raised to when the world was loaded.
+    pub exponent: f32,
+}
+
+impl Encoding {
+    /// The one that inverts how calibration reads a world's stored light; for a world that is not calibrated: bytes in
+    /// proportion to light.
+    pub fn of(world: &RelitWorld) -> Encoding {
+        Encoding {
+            // the unit of calibrated light is display white for any gamma
+            full: OVERBRIGHT.powf(world.stored_gamma),
+            gamma: world.stored_gamma,
+            compensate: 1.0,
+            exponent: world.color_exponent / world.stored_gamma,
+        }
+    }
+
+    /// Sets the gamma of a compiler, which leaves a byte of 255 as it is.
+    pub fn set_gamma(&mut self, gamma: f32) {
+        (self.full, self.gamma, self.exponent) = (OVERBRIGHT, gamma, 1.0);
+    }
+
+    /// Bytes of light (irradiance over π). `scale`: factor of the material ([`WorldMaterial::stored_scale`]). A colour
+    /// with a channel above 255 is scaled down whole, so that its hue stays.
+    ///
+    /// [`WorldMaterial::stored_scale`]: crate::WorldMaterial::stored_scale
+    pub fn bytes(&self, light: Vec3, scale: f32) -> [u8; 3] {
+        let light = match self.exponent == 1.0 {
+            true => light.max(Vec3::ZERO),
+            false => raise(light, self.exponent.recip()),
+        } * scale;
+        let part = light / self.full;
+        let encoded = match self.gamma == 1.0 {
+            true => part,
+            false => part.powf(self.gamma.recip()),
+        };
+        let value = encoded * (255.0 / self.compensate);
+        let most = value.max_element();
+        let bound = if most > 255.0 { 255.0 / most } else { 1.0 };
+        (value * bound)
+            .to_array()
+            .map(|channel| channel.round() as u8)
+    }
+
+    /// Bytes of an image that is shown as it is, without overbright bits.
+    pub fn shown(&self, light: Vec3, scale: f32) -> [u8; 3] {
+        Encoding {
+            compensate: self.compensate / OVERBRIGHT,
+            ..*self
+        }
+        .bytes(light, scale)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLAIN: Encoding = Encoding {
+        full: OVERBRIGHT,
+        gamma: 1.0,
+        compensate: 1.0,
+        exponent: 1.0,
+    };
+
+    #[test]
+    fn bytes_are_in_proportion_to_light_and_keep_their_hue() {
+        assert_eq!(PLAIN.bytes(Vec3::new(1.0, 0.5, 0.0), 1.0), [64, 32, 0]);
+        assert_eq!(PLAIN.bytes(Vec3::new(8.0, 4.0, 2.0), 1.0), [255, 128, 64]);
+        assert_eq!(PLAIN.shown(Vec3::new(1.0, 0.5, 0.0), 1.0), [255, 128, 0]);
+        assert_eq!(PLAIN.bytes(Vec3::new(f32::NAN, -1.0, 0.1), 1.0)[1], 0);
+        let half = Encoding {
+            compensate: 2.0,
+            ..PLAIN
+        };
+        assert_eq!(half.bytes(Vec3::ONE, 1.0), [32; 3]);
+    }
+
+    #[test]
+    fn gamma_is_that_which_calibration_inverts() {
+        let encoding = Encoding {
+            full: OVERBRIGHT * OVERBRIGHT,
+            gamma: 2.0,
+            ..PLAIN
+        };
+        for value in [3u8, 40, 130, 255] {
+            let light = (f32::from(value) * OVERBRIGHT / 255.0).powf(2.0);
+            assert_eq!(encoding.bytes(Vec3::splat(light), 1.0), [value; 3]);
+        }
+    }
+}

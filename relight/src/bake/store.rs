@@ -1,0 +1,134 @@
+//! Baked light in a map's lumps.
+
+use super::{Baked, BakedPage, Encoding};
+use crate::world::{RelitWorld, WorldSurface};
+use glam::{Vec2, Vec3};
+use q3bsp::{Bsp, SurfaceKind};
+use std::collections::HashMap;
+use support::slice::item;
+
+/// What was changed in a map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Stored {
+    /// Pages of lightmaps.
+    pub pages: usize,
+    /// Texels in them.
+    pub texels: usize,
+    /// Vertices.
+    pub vertices: usize,
+    /// Points of the light grid.
+    pub grid: usize,
+    /// Pages that the map's scripts name; they are images outside of the map and stay as they are.
+    pub outside: usize,
+}
+
+impl Baked {
+    /// Writes the light into a map: the one of the world, or one with the same surfaces, vertices and pages. Texels that no
+    /// surface shows, and everything that is no light, stay as they are.
+    pub fn store(&self, world: &RelitWorld, bsp: &mut Bsp, encoding: Encoding) -> Stored {
+        let mut stored = Stored::default();
+        let mut sources: HashMap<usize, &BakedPage> = HashMap::new();
+        for page in &self.pages {
+            sources.insert(page.number, page);
+            let Some(target) = bsp.lightmaps.get_mut(page.number) else {
+                stored.outside += 1;
+                continue;
+            };
+            stored.pages += 1;
+            let texels = target.0.as_chunks_mut::<3>().0.iter_mut();
+            for ((texel, light), &owner) in texels.zip(&page.light).zip(&page.owners) {
+                if owner != u32::MAX {
+                    *texel = encoding.bytes(light.value, scale_of(world, owner));
+                    stored.texels += 1;
+                }
+            }
+        }
+        for &(vertex, surface, light) in &self.vertices {
+            let bytes = encoding.bytes(light, scale_of(world, surface));
+            stored.vertices += usize::from(set_color(bsp, vertex, bytes));
+        }
+        for surface in 0..world.surfaces.len() {
+            stored.vertices += color_by_page(world, bsp, surface, &sources, encoding);
+        }
+        if let Some(grid) = &self.grid {
+            bsp.light_grid.clone_from(grid);
+            stored.grid = grid.len();
+        }
+        stored
+    }
+}
+
+/// Factor of a surface's material before light is stored.
+fn scale_of(world: &RelitWorld, surface: u32) -> f32 {
+    let surface = world.surfaces.get(surface as usize);
+    let material = surface.and_then(|surface| world.material_of(surface));
+    material.map_or(1.0, crate::WorldMaterial::stored_scale)
+}
+
+/// Sets the colour of a vertex; its alpha stays.
+fn set_color(bsp: &mut Bsp, vertex: u32, [r, g, b]: [u8; 3]) -> bool {
+    let Some(vertex) = bsp.vertices.get_mut(vertex as usize) else {
+        return false;
+    };
+    let [.., alpha] = vertex.color;
+    vertex.color = [r, g, b, alpha];
+    true
+}
+
+/// Gives the vertices of a lightmapped surface the light of their texels, which engines show with `r_vertexLight`.
+fn color_by_page(
+    world: &RelitWorld,
+    bsp: &mut Bsp,
+    surface: usize,
+    pages: &HashMap<usize, &BakedPage>,
+    encoding: Encoding,
+) -> usize {
+    let shown = |surface: &&WorldSurface| {
+        matches!(surface.kind, SurfaceKind::Planar | SurfaceKind::Patch) && surface.num_indices > 0
+    };
+    let Some(own) = world.surfaces.get(surface).filter(shown) else {
+        return 0;
+    };
+    let page = usize::try_from(own.light_page).ok();
+    let (Some(page), Some(stored)) = (
+        page.and_then(|page| pages.get(&page)),
+        bsp.surfaces.get(surface).copied(),
+    ) else {
+        return 0;
+    };
+    let scale = scale_of(world, surface as u32);
+    let places: Vec<(u32, Option<Vec3>)> = (stored.first_vert.max(0) as u32..)
+        .zip(bsp.surface_vertices(&stored))
+        .map(|(index, vertex)| (index, near(page, vertex.finite().lightmap)))
+        .collect();
+    let mut changed = 0;
+    for (vertex, light) in places {
+        if let Some(light) = light {
+            changed += usize::from(set_color(bsp, vertex, encoding.bytes(light, scale)));
+        }
+    }
+    changed
+}
+
+/// Light of the texel at a place in a page (0 to 1), or of the nearest lit texel beside it.
+fn near(page: &BakedPage, at: Vec2) -> Option<Vec3> {
+    let place = at * page.side as f32;
+    let texel = place.floor();
+    let mut best: Option<(f32, Vec3)> = None;
+    for dy in -1..=1 {
+        for dx in -1..=1 {
+            let at = texel + Vec2::new(dx as f32, dy as f32);
+            let inside = at.min_element() >= 0.0 && at.max_element() < page.side as f32;
+            if !inside {
+                continue;
+            }
+            let index = at.y as usize * page.side + at.x as usize;
+            let distance = (at + 0.5 - place).length_squared();
+            let lit = page.owners.get(index).is_some_and(|o| *o != u32::MAX);
+            if lit && best.is_none_or(|(least, _)| distance < least) {
+                best = Some((distance, item(&page.light, index).value));
+            }
+        }
+    }
+    best.map(|(_, light)| light)
+}

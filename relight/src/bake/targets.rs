@@ -1,0 +1,257 @@
+//! Where a map stores light, and the points that stand for each place.
+
+use super::coverage::{PageTriangle, Place, places};
+use super::{LitTriangle, Point};
+use crate::occluders::Occluders;
+use crate::world::{RelitWorld, WorldMaterial, WorldSurface};
+use glam::Vec3;
+use q3bsp::SurfaceKind;
+use std::ops::Range;
+use support::parallel;
+use support::slice::{self, span};
+
+/// Distance of a point from its surface, id units: as compilers have it.
+const LIFT: f32 = 1.0;
+
+/// Depth inside a brush from which a point is inside, id units, negative inside.
+const INSIDE: f32 = -0.5;
+
+/// Distances by which a point inside of something solid is moved along the surface, id units.
+const MOVES: [f32; 3] = [2.0, 5.0, 9.0];
+
+/// A texel that surfaces cover.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Texel {
+    /// Index in its page, row by row.
+    pub at: u32,
+    /// Surface that covers it.
+    pub surface: u32,
+    /// Its points in [`Targets::points`]; none if all lay in solid.
+    pub points: Range<u32>,
+}
+
+/// A page that surfaces use.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Page {
+    /// Number, as [`RelitWorld::page`] counts.
+    pub number: usize,
+    /// Texels per side.
+    pub side: usize,
+    /// Index of its first texel in the light of all places.
+    pub first: usize,
+    /// Its covered texels, ascending.
+    pub texels: Vec<Texel>,
+}
+
+/// A vertex that stores light.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Vertex {
+    /// Index into the map's vertices.
+    pub vertex: u32,
+    /// Index into [`RelitWorld::vertices`], for vertices that are drawn where they are stored.
+    pub drawn: Option<u32>,
+    /// Its surface.
+    pub surface: u32,
+    /// Its point in [`Targets::points`]; empty if it lies in solid.
+    pub points: Range<u32>,
+}
+
+/// Where a map stores light.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Targets {
+    /// Points whose light is wanted.
+    pub points: Vec<Point>,
+    pub pages: Vec<Page>,
+    /// Vertices of surfaces that are lit by vertex.
+    pub vertices: Vec<Vertex>,
+    /// Where the light of each triangle is.
+    pub lit: Vec<LitTriangle>,
+    /// Number of places: texels of all pages, then the world's vertices.
+    pub places: usize,
+    /// Number of texels of all pages.
+    pub texels: usize,
+}
+
+/// Whether a surface shows the light of its page or its vertices.
+fn shows_light(world: &RelitWorld, surface: &WorldSurface) -> bool {
+    let lit = |material: &WorldMaterial| !material.is_sky();
+    world.material_of(surface).is_some_and(lit)
+}
+
+/// Whether a surface's light is stored at its vertices.
+fn is_lit_by_vertex(surface: &WorldSurface) -> bool {
+    surface.light_page == q3bsp::lightmap_index::BY_VERTEX
+        && surface.num_indices > 0
+        && !matches!(surface.kind, SurfaceKind::Flare | SurfaceKind::Foliage)
+}
+
+impl Targets {
+    /// The texels and vertices of a world. `pattern`: points along each side of a texel.
+    pub fn of(world: &RelitWorld, occluders: &Occluders, pattern: u32) -> Targets {
+        let mut targets = Targets {
+            lit: vec![LitTriangle::Dark; world.indices.len() / 3],
+            ..Targets::default()
+        };
+        targets.add_pages(world, occluders, pattern);
+        targets.texels = targets.places;
+        targets.add_vertices(world, occluders);
+        targets.places += world.vertices.len();
+        targets
+    }
+
+    fn add_pages(&mut self, world: &RelitWorld, occluders: &Occluders, pattern: u32) {
+        let count = world.bsp.lightmaps.len() + world.pages.len();
+        let mut of_page: Vec<Vec<(u32, PageTriangle)>> = vec![Vec::new(); count];
+        let mut sides = vec![0; count];
+        let mut first = Vec::with_capacity(count);
+        for (number, slot) in sides.iter_mut().enumerate() {
+            *slot = world.page(number).map_or(0, q3bsp::Lightmap::size);
+            first.push(self.places);
+            self.places += *slot * *slot;
+        }
+        for (index, surface) in (0u32..).zip(&world.surfaces) {
+            let Some(page) = usize::try_from(surface.light_page).ok() else {
+                continue;
+            };
+            let side = slice::item(&sides, page);
+            if side == 0 || !shows_light(world, surface) {
+                continue;
+            }
+            for number in surface.triangles() {
+                let Some(triangle) = PageTriangle::new(world.corners(number), side) else {
+                    continue;
+                };
+                if let Some(slot) = self.lit.get_mut(number) {
+                    *slot = LitTriangle::Texels {
+                        first: slice::item(&first, page) as u32,
+                        side: side as u32,
+                        corners: triangle.corners(),
+                    };
+                }
+                if let Some(list) = of_page.get_mut(page) {
+                    list.push((index, triangle));
+                }
+            }
+        }
+        let found = parallel::map(&of_page, |page, triangles| {
+            let places = places(slice::item(&sides, page), pattern, triangles);
+            let free = |place: &Place| point(world, occluders, place);
+            let points: Vec<Option<Point>> = places.iter().map(free).collect();
+            (places, points)
+        });
+        for (number, (places, points)) in found.into_iter().enumerate() {
+            let mut texels: Vec<Texel> = Vec::new();
+            for (place, point) in places.iter().zip(points) {
+                if texels.last().is_none_or(|texel| texel.at != place.texel) {
+                    let start = self.points.len() as u32;
+                    texels.push(Texel {
+                        at: place.texel,
+                        surface: place.surface,
+                        points: start..start,
+                    });
+                }
+                self.points.extend(point);
+                if let Some(texel) = texels.last_mut() {
+                    texel.points.end = self.points.len() as u32;
+                }
+            }
+            if !texels.is_empty() {
+                self.pages.push(Page {
+                    number,
+                    side: slice::item(&sides, number),
+                    first: slice::item(&first, number),
+                    texels,
+                });
+            }
+        }
+    }
+
+    fn add_vertices(&mut self, world: &RelitWorld, occluders: &Occluders) {
+        let base = self.places as u32;
+        let mut all = Vec::new();
+        for (index, surface) in (0u32..).zip(&world.surfaces) {
+            if !is_lit_by_vertex(surface) || !shows_light(world, surface) {
+                continue;
+            }
+            let Some(stored) = world.bsp.surfaces.get(index as usize) else {
+                continue;
+            };
+            let drawn = !matches!(surface.kind, SurfaceKind::Patch);
+            let made = world.vertices_of(surface);
+            for (k, raw) in (0u32..).zip(world.bsp.surface_vertices(stored)) {
+                let own = made.get(k as usize).filter(|_| drawn);
+                let clean = raw.finite();
+                let place = Place {
+                    texel: 0,
+                    surface: index,
+                    position: own.map_or(clean.position, |v| v.position),
+                    normal: own.map_or(clean.normal.normalize_or(Vec3::Z), |v| v.normal),
+                };
+                all.push((
+                    place,
+                    stored.first_vert.max(0) as u32 + k,
+                    drawn.then_some(surface.first_vertex + k),
+                ));
+            }
+            if drawn {
+                for number in surface.triangles() {
+                    let corners = span(number as u32 * 3, 3);
+                    if let Some(&[a, b, c]) = world.indices.get(corners)
+                        && let Some(slot) = self.lit.get_mut(number)
+                    {
+                        *slot = LitTriangle::Vertices([a, b, c].map(|corner| base + corner));
+                    }
+                }
+            }
+        }
+        let points = parallel::map(&all, |_, (place, ..)| point(world, occluders, place));
+        for ((place, vertex, drawn), point) in all.into_iter().zip(points) {
+            let start = self.points.len() as u32;
+            self.points.extend(point);
+            self.vertices.push(Vertex {
+                vertex,
+                drawn,
+                surface: place.surface,
+                points: start..self.points.len() as u32,
+            });
+        }
+    }
+}
+
+/// The point of a place: above its surface, moved along it if that lies in solid. `None` if no point near it is free.
+fn point(world: &RelitWorld, occluders: &Occluders, place: &Place) -> Option<Point> {
+    let surface = world.surfaces.get(place.surface as usize)?;
+    let model = world.models.get(surface.model as usize);
+    let origin = model.map_or(Vec3::ZERO, |m| m.origin);
+    let normal = place.normal;
+    let on = place.position + origin + normal * LIFT;
+    if surface.model != 0 || is_free(world, on) {
+        return on.is_finite().then_some(Point {
+            position: on,
+            normal,
+        });
+    }
+    let (u, v) = normal.any_orthonormal_pair();
+    let around = [u, -u, v, -v, u + v, u - v, v - u, -u - v];
+    MOVES.iter().find_map(|step| {
+        around.iter().find_map(|direction| {
+            let position = on + *direction * *step;
+            let free = is_free(world, position) && is_outside(occluders, position, normal);
+            free.then_some(Point { position, normal })
+        })
+    })
+}
+
+/// Whether a position is inside of the map and of nothing solid.
+pub(super) fn is_free(world: &RelitWorld, position: Vec3) -> bool {
+    let leafs = world.bsp.visibility.is_some() || world.bsp.leafs.len() > 1;
+    position.is_finite()
+        && (!leafs || world.bsp.cluster_at(position) >= 0)
+        && !world.bsp.is_in_drawn_brush(position, INSIDE)
+}
+
+/// Whether the surface above a position faces it: otherwise it lies behind a wall.
+fn is_outside(occluders: &Occluders, position: Vec3, normal: Vec3) -> bool {
+    let hit = occluders.nearest(position, normal, f32::INFINITY);
+    hit.is_none_or(|hit| hit.front || hit.sky)
+}
