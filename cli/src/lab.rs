@@ -1,5 +1,6 @@
 //! The subcommands of `relight-lab`: measurements of the renderer, without an engine or a display.
 
+mod agreement;
 mod bodies;
 mod chromaticity;
 mod curves;
@@ -29,6 +30,7 @@ pub struct Cli {
 // No documentation comments on the variants: clap would show them in place of the descriptions of the arguments.
 #[derive(Subcommand, Debug)]
 enum Command {
+    Agreement(agreement::AgreementArgs),
     Bodies(bodies::BodiesArgs),
     Curves(curves::CurvesArgs),
     Estimators(estimators::EstimatorsArgs),
@@ -51,6 +53,7 @@ const REPLACED: [(&str, &str, &str); 2] = [
 /// Those of the subcommand.
 pub fn run() -> Result<ExitCode> {
     match parse::<Cli>(&REPLACED).command {
+        Command::Agreement(args) => agreement::run(&args),
         Command::Bodies(args) => bodies::run(&args),
         Command::Curves(args) => curves::run(&args),
         Command::Estimators(args) => estimators::run(&args),

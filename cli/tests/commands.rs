@@ -42,6 +42,7 @@ fn help_lists_the_commands_of_users_and_those_of_the_lab_apart() {
     ];
     assert_eq!(listed(RELIGHT), users);
     let lab = [
+        "agreement",
         "bodies",
         "curves",
         "estimators",
