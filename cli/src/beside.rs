@@ -12,6 +12,15 @@ use relight::MemoryFiles;
 /// Such a file exists and cannot be read.
 pub fn beside(file: &Path) -> Result<MemoryFiles> {
     let mut found = MemoryFiles::new();
+    add_beside(&mut found, file)?;
+    Ok(found)
+}
+
+/// Adds them to `found`.
+///
+/// # Errors
+/// As [`beside`].
+pub fn add_beside(found: &mut MemoryFiles, file: &Path) -> Result<()> {
     // a path that ends in `..` has no name, so no files belong to it
     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
     let mut take = |path: &Path, game_path: String| -> Result<()> {
@@ -37,7 +46,7 @@ pub fn beside(file: &Path) -> Result<MemoryFiles> {
             }
         }
     }
-    Ok(found)
+    Ok(())
 }
 
 #[cfg(test)]

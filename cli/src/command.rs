@@ -8,7 +8,7 @@ use clap::{Parser, Subcommand};
 use crate::outcome::parse;
 use crate::{
     bake, calibration, cameras, compare, convert, info, lights, material, render, report, sample,
-    viewer,
+    viewer, watch,
 };
 
 /// Maps of id Tech 3 games: contents, conversion, pictures with new light
@@ -34,6 +34,7 @@ enum Command {
     Report(report::ReportArgs),
     Sample(sample::SampleArgs),
     View(Box<viewer::ViewArgs>),
+    Watch(Box<watch::WatchArgs>),
 }
 
 /// Names of earlier versions: subcommand, option (empty for the subcommand itself), replacement.
@@ -71,6 +72,7 @@ pub fn run() -> Result<ExitCode> {
         Command::Report(args) => report::run(&args),
         Command::Sample(args) => sample::run(&args),
         Command::View(args) => viewer::run(&args),
+        Command::Watch(args) => watch::run(&args),
     }?;
     Ok(ExitCode::SUCCESS)
 }

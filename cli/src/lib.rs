@@ -37,6 +37,8 @@ mod table;
 mod timings;
 mod view;
 mod viewer;
+mod watch;
+mod watched;
 
 use std::process::ExitCode;
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::beside::beside;
+use crate::beside::{add_beside, beside};
 use crate::game::Game;
 use anyhow::{Context, bail};
 use glam::Vec3;
@@ -58,6 +58,27 @@ pub fn open(map: &str, game: &Game) -> anyhow::Result<(Arc<dyn GameFiles>, Strin
         _ => format!("maps/{map}.bsp"),
     };
     Ok((with_map_files(path, MemoryFiles::new(), &name)?, name))
+}
+
+/// Opens a map whose bytes are known, `NAME.bsp`, with its game files and the files beside `places`; also returns its game
+/// path.
+///
+/// # Errors
+/// A folder or a file cannot be read, or the bytes are no map.
+pub fn open_bytes(
+    bytes: Vec<u8>,
+    places: &[PathBuf],
+    game: &Game,
+) -> anyhow::Result<(Arc<dyn GameFiles>, String)> {
+    let stem = places.first().and_then(|file| file.file_stem());
+    let stem = stem.and_then(|s| s.to_str()).unwrap_or("map");
+    let name = format!("maps/{stem}.bsp");
+    let mut front = MemoryFiles::new();
+    for place in places {
+        add_beside(&mut front, place)?;
+    }
+    front.insert(&name, bytes)?;
+    Ok((with_map_files(game.files()?, front, &name)?, name))
 }
 
 /// Name of a map for files and tables, without folders. `path`: from [`open`].

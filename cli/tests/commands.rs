@@ -38,6 +38,7 @@ fn help_lists_the_commands_of_users_and_those_of_the_lab_apart() {
         "report",
         "sample",
         "view",
+        "watch",
         "help",
     ];
     assert_eq!(listed(RELIGHT), users);

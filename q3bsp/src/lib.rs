@@ -54,6 +54,7 @@ mod grid;
 mod ids;
 mod layers;
 mod lumps;
+pub mod map_text;
 mod parse;
 mod patch;
 #[cfg(feature = "quake")]

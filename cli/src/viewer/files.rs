@@ -57,7 +57,9 @@ impl Viewer {
             &name,
             &chosen.game.paths,
         );
-        self.title = Some(format!("{} – Relight", view::map_name(&name)));
+        if self.follow.is_none() {
+            self.title = Some(format!("{} – Relight", view::map_name(&name)));
+        }
         self.map = Some(Map {
             name,
             files,
@@ -67,7 +69,7 @@ impl Viewer {
             probe: None,
         });
         self.picked = None;
-        self.editor = None;
+        self.keep_edits();
         self.found = false;
         self.finder = None;
         Ok(())
@@ -75,6 +77,9 @@ impl Viewer {
 
     /// Loads the map again after a change; the picture before stays if that fails.
     pub(super) fn reload(&mut self) {
+        if self.follow.is_some() && self.map.is_none() {
+            return; // there is none yet
+        }
         match self.load() {
             Ok(()) => self.message = Some("reloaded: files have changed".to_owned()),
             Err(e) => self.message = Some(format!("not reloaded: {e:#}")),
@@ -83,7 +88,7 @@ impl Viewer {
 
     /// Begins the search for lights, or takes over its result.
     pub(super) fn follow_finder(&mut self) {
-        if self.map.is_none() || self.found || !self.shown.is_traced() {
+        if self.map.is_none() || self.found || !self.shown.is_traced() || !self.needs_finder() {
             return;
         }
         let finder = self.finder.get_or_insert_with(|| {
@@ -96,14 +101,16 @@ impl Viewer {
             )
         });
         match finder.update() {
-            Progress::Part(_) => {}
-            Progress::Found => self.found = true,
+            Progress::Part(_) => return,
+            Progress::Found => {}
             Progress::Failed(why) => {
                 // the renderer then searches by itself
                 self.message = Some(why.clone());
-                self.found = true;
             }
         }
+        self.found = true;
+        // other lights are changed from now on
+        self.keep_edits();
     }
 
     /// Reloads what has changed on disk; whether changes are being collected.

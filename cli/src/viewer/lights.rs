@@ -132,6 +132,11 @@ impl Editor {
         editor
     }
 
+    /// Lists other lights as now; what is saved stays.
+    pub fn show(&mut self, now: &ChangeableLights) {
+        self.list(now);
+    }
+
     fn list(&mut self, lights: &ChangeableLights) {
         let points = lights.points.iter().map(|light| Kind::Point(*light));
         let suns = lights.suns.iter().map(|sun| Kind::Sun(*sun));

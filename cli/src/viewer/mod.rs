@@ -2,6 +2,7 @@
 
 mod app;
 mod files;
+mod follow;
 mod lights;
 mod panels;
 mod picked;
@@ -20,7 +21,10 @@ use crate::chosen::{ChosenCamera, ChosenMap};
 use crate::pictures::check_name;
 use crate::render::parse_size;
 use crate::settings::SettingArgs;
-use state::{Shown, Start};
+pub use app::WindowOptions;
+pub use follow::State;
+pub use source::{Followed, Source};
+pub use state::{Shown, Start, Viewer};
 
 /// Show a map in a window: fly and walk through it, compare looks, change settings and lights
 ///
@@ -33,6 +37,17 @@ use state::{Shown, Start};
 pub struct ViewArgs {
     #[command(flatten)]
     chosen: ChosenMap,
+    #[command(flatten)]
+    window: WindowArgs,
+    /// Write what the window shows, panel included, once the look is ready, and end (PNG, or JPEG by the ending .jpg)
+    #[arg(long, value_name = "PATH")]
+    screenshot: Option<PathBuf>,
+}
+
+// No documentation comment: clap would show it in place of the subcommand's description.
+// The window, and what it shows first.
+#[derive(Args, Debug)]
+pub struct WindowArgs {
     /// What is shown at first
     #[arg(
         long = "look",
@@ -59,9 +74,6 @@ pub struct ViewArgs {
     /// Enable Vulkan's validation layer; any message is an error
     #[arg(long)]
     validate: bool,
-    /// Write what the window shows, panel included, once the look is ready, and end (PNG, or JPEG by the ending .jpg)
-    #[arg(long, value_name = "PATH")]
-    screenshot: Option<PathBuf>,
     #[command(flatten)]
     set: SettingArgs,
 }
@@ -80,40 +92,70 @@ fn cache_folder() -> Option<PathBuf> {
     Some(folder.join("relight"))
 }
 
-/// Runs the command.
-pub fn run(args: &ViewArgs) -> Result<()> {
-    if let Some(path) = &args.screenshot {
-        check_name(path)?;
+impl WindowArgs {
+    /// The start of a viewer of this map, and its window.
+    ///
+    /// # Errors
+    /// There is no folder for what is cached.
+    pub fn start(&self, source: Source) -> Result<(Start, WindowOptions)> {
+        let cache = self.cache.clone().or_else(cache_folder);
+        let cache = cache.context(
+            "no folder for cached lights: neither XDG_CACHE_HOME nor HOME is set; name one with --cache DIR",
+        )?;
+        let start = Start {
+            source,
+            cache,
+            shown: self.look,
+            settings: self.set.change([], renderer_vk::Settings::full_size()),
+            place: self.place.clone(),
+        };
+        let options = WindowOptions {
+            size: self.size,
+            device: self.device.clone(),
+            validation: self.validate,
+            screenshot: None,
+        };
+        Ok((start, options))
     }
-    let cache = args.cache.clone().or_else(cache_folder);
-    let cache = cache.context(
-        "no folder for cached lights: neither XDG_CACHE_HOME nor HOME is set; name one with --cache DIR",
-    )?;
-    let source = source::Source {
-        chosen: args.chosen.clone(),
-        lights: args.lights.clone(),
-    };
-    // errors of the map are reported before a window appears
-    source.open()?;
-    let start = Start {
-        source,
-        cache,
-        shown: args.look,
-        settings: args.set.change([], renderer_vk::Settings::full_size()),
-        place: args.place.clone(),
-    };
-    let options = app::WindowOptions {
-        size: args.size,
-        device: args.device.clone(),
-        validation: args.validate,
-        screenshot: args.screenshot.clone(),
-    };
+
+    /// The file of lights that is read and saved in place of the one beside the map.
+    pub fn lights(&self) -> Option<PathBuf> {
+        self.lights.clone()
+    }
+}
+
+/// Shows a window until it is closed; messages of a validation layer that was asked for are an error.
+///
+/// # Errors
+/// As those of [`app::run`].
+pub fn show(start: Start, options: WindowOptions) -> Result<()> {
+    let validates = options.validation;
     let messages = app::run(start, options)?;
     match messages.first() {
-        Some(first) if args.validate => bail!(
+        Some(first) if validates => bail!(
             "the validation layer has {} messages, the first: {first}",
             messages.len()
         ),
         _ => Ok(()),
     }
+}
+
+/// Runs the command.
+pub fn run(args: &ViewArgs) -> Result<()> {
+    if let Some(path) = &args.screenshot {
+        check_name(path)?;
+    }
+    let source = Source {
+        chosen: args.chosen.clone(),
+        lights: args.window.lights(),
+        followed: None,
+    };
+    let (start, options) = args.window.start(source)?;
+    // errors of the map are reported before a window appears
+    start.source.open()?;
+    let options = WindowOptions {
+        screenshot: args.screenshot.clone(),
+        ..options
+    };
+    show(start, options)
 }

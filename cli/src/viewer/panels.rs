@@ -120,6 +120,9 @@ impl Viewer {
             let gpu = frame_time(self.costs.newest());
             let rate = 1.0 / self.frame_seconds.max(1e-4);
             ui.weak(format!("GPU {gpu:.2} ms, {rate:.0} frames/s"));
+            if let Some(follow) = &self.follow {
+                ui.label(follow.line());
+            }
             if let Some(message) = &self.message {
                 ui.label(message);
             }
@@ -143,6 +146,7 @@ impl Viewer {
             ui.checkbox(&mut self.animates, "animate");
         });
         self.progress(ui);
+        self.watch_state(ui);
         ui.separator();
         ui.horizontal(|ui| {
             ui.label("Preset");
@@ -182,7 +186,7 @@ impl Viewer {
         if !self.shown.is_traced() {
             return;
         }
-        if let Some(finder) = self.finder.as_ref().filter(|_| !self.can_trace()) {
+        if let Some(finder) = self.finder.as_ref().filter(|_| !self.found) {
             if let Progress::Part(part) = finder.newest {
                 let left = finder.left().map(|s| format!(", about {s:.0} s left"));
                 let text = format!("finding the map's lights{}", left.unwrap_or_default());
@@ -202,6 +206,22 @@ impl Viewer {
             };
             let part = frames as f32 / self.wanted_frames as f32;
             ui.add(egui::ProgressBar::new(part.min(1.0)).text(text));
+        }
+    }
+
+    /// What has become of the files of a map that is being made.
+    fn watch_state(&self, ui: &mut Ui) {
+        let Some(follow) = &self.follow else {
+            return;
+        };
+        ui.separator();
+        ui.strong(follow.line());
+        ui.weak(follow.files());
+        if let Some(problem) = &follow.problem {
+            ui.label(RichText::new(problem).monospace());
+        }
+        if let Some(note) = &follow.note {
+            ui.label(note);
         }
     }
 
@@ -260,7 +280,7 @@ impl Viewer {
                         }
                     });
                 ui.label("Light that reaches this place:");
-                if !self.found {
+                if !self.can_trace() {
                     ui.weak("The map's lights are not found yet: choose Traced, then click again.");
                 }
                 egui::Grid::new("arriving").striped(true).show(ui, |ui| {

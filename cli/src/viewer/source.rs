@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 use notify::{RecommendedWatcher, RecursiveMode, Watcher};
+use q3bsp::Bsp;
 use relight::light::sweep;
 use relight::{
     CalibrationCache, CalibrationOptions, GameFiles, Overlay, RelitWorld, calibrate_with,
@@ -14,7 +15,10 @@ use relight::{
 use renderer_vk::{Settings, map_options};
 
 use crate::chosen::ChosenMap;
+use crate::game::Game;
 use crate::scripts::load_scripts;
+use crate::view::open_bytes;
+use crate::watched::{Compiled, Files, SourceText};
 
 /// Files that a map is made of.
 const WATCHED: [&str; 12] = [
@@ -42,6 +46,46 @@ pub struct Source {
     pub chosen: ChosenMap,
     /// A file of lights that replaces the one of the map.
     pub lights: Option<PathBuf>,
+    /// What `relight watch` follows; other changes of compiled maps do not concern it.
+    pub followed: Option<Followed>,
+}
+
+/// A map that is being made.
+#[derive(Clone, Debug)]
+pub struct Followed {
+    /// Its files.
+    pub files: Files,
+    /// The newest compiled map.
+    pub map: Option<Compiled>,
+    /// The newest `.map`, whose entities light the compiled map.
+    pub text: Option<Arc<SourceText>>,
+}
+
+impl Followed {
+    /// Before anything is read.
+    pub fn new(files: Files) -> Self {
+        Self {
+            files,
+            map: None,
+            text: None,
+        }
+    }
+
+    fn open(&self, game: &Game) -> Result<(Arc<dyn GameFiles>, String)> {
+        let map = self.map.as_ref().context("no compiled map yet")?;
+        let bytes = match &self.text {
+            None => map.bytes.to_vec(),
+            Some(text) => {
+                let mut bsp = Bsp::parse(&map.bytes)?;
+                text.light(&mut bsp);
+                bsp.write()
+            }
+        };
+        let own = self.files.bsp.clone();
+        let compiled = (map.place != own).then(|| map.place.clone());
+        let places: Vec<PathBuf> = std::iter::once(own).chain(compiled).collect();
+        open_bytes(bytes, &places, game)
+    }
 }
 
 impl Source {
@@ -50,7 +94,10 @@ impl Source {
     /// # Errors
     /// A folder or the map cannot be read.
     pub fn open(&self) -> Result<(Arc<dyn GameFiles>, String)> {
-        let (files, name) = self.chosen.open()?;
+        let (files, name) = match &self.followed {
+            Some(followed) => followed.open(&self.chosen.game)?,
+            None => self.chosen.open()?,
+        };
         let Some(path) = self.lights.as_ref().filter(|path| path.is_file()) else {
             return Ok((files, name));
         };
@@ -83,7 +130,7 @@ impl Source {
         };
         for file in [&map]
             .into_iter()
-            .filter(|map| map.is_file())
+            .filter(|map| map.is_file() || self.followed.is_some())
             .chain(&self.lights)
         {
             watched.push((parent(file), RecursiveMode::NonRecursive));
@@ -93,6 +140,13 @@ impl Source {
 
     /// Whether the map may use this file. The folder of a single file holds others, too.
     fn concerns(&self, path: &Path) -> bool {
+        let is_map = |path: &Path| {
+            path.extension()
+                .is_some_and(|e| e.eq_ignore_ascii_case("bsp"))
+        };
+        if self.followed.is_some() && is_map(path) {
+            return false;
+        }
         if self
             .chosen
             .game
@@ -292,7 +346,6 @@ fn kind(path: &Path) -> Option<Changed> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::game::Game;
     use relight::sample::Sample;
 
     fn chosen(map: Option<String>) -> ChosenMap {
@@ -311,6 +364,7 @@ mod tests {
         let source = Source {
             chosen: chosen(Some(map.display().to_string())),
             lights: None,
+            followed: None,
         };
         let mut changes = Changes::watch(&source, || ());
         assert_eq!(changes.take(), (None, false));
@@ -345,6 +399,7 @@ mod tests {
         let source = Source {
             chosen: chosen(None),
             lights: Some(lights),
+            followed: None,
         };
         let (files, name) = source.open().unwrap();
         let path = name.replace(".bsp", ".lights");
@@ -357,6 +412,7 @@ mod tests {
         let source = Source {
             chosen: chosen(None),
             lights: None,
+            followed: None,
         };
         let cache = CalibrationCache::new(folder.path());
         let mut finder = Finder::begin(source, cache, Settings::default(), || ());

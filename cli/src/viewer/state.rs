@@ -15,9 +15,10 @@ use relight::viewpoints::Viewpoint;
 use relight::{GameFiles, Materials};
 use renderer_vk::api::{Look, Picture, RefDef, RefEntity};
 use renderer_vk::settings::{Given, Preset, flags, row};
-use renderer_vk::{Renderer, Settings};
+use renderer_vk::{MapLightChoice, Renderer, Settings};
 use shaderscript::Diagnostic;
 
+use super::follow::Follow;
 use super::lights::Editor;
 use super::picked::Picked;
 use super::source::{Changes, Finder, Source};
@@ -125,6 +126,8 @@ pub struct Viewer {
     /// The lights of the map are known to the renderer.
     pub(super) found: bool,
     pub(super) changes: Changes,
+    /// `relight watch`.
+    pub(super) follow: Option<Follow>,
     pub(super) editor: Option<Editor>,
     pub(super) lights_path: Option<PathBuf>,
     pub(super) picked: Option<Picked>,
@@ -147,8 +150,10 @@ pub struct Viewer {
     /// Rectangle of the view in the newest frame, points.
     pub(super) view_rect: egui::Rect,
     /// Frames shown since the look is complete.
-    complete_frames: u32,
+    pub(super) complete_frames: u32,
     pub(super) title: Option<String>,
+    /// The title of a followed map.
+    pub(super) shown_title: Option<String>,
     opened: Instant,
     /// Seconds from the start to the first picture of the map.
     pub(super) first_picture: Option<f32>,
@@ -181,6 +186,8 @@ impl Viewer {
         renderer.begin_registration(none, &settings)?;
         let woken = Arc::clone(&wake);
         let changes = Changes::watch(&start.source, move || woken());
+        let follow = start.source.followed.as_ref();
+        let follow = follow.map(|followed| Follow::begin(&followed.files, &wake));
         Ok(Self {
             renderer,
             gui: Gui::new(),
@@ -196,6 +203,7 @@ impl Viewer {
             finder: None,
             found: false,
             changes,
+            follow,
             editor: None,
             lights_path: None,
             picked: None,
@@ -213,6 +221,7 @@ impl Viewer {
             view_rect: egui::Rect::NOTHING,
             complete_frames: 0,
             title: None,
+            shown_title: None,
             opened: Instant::now(),
             first_picture: None,
         })
@@ -258,6 +267,16 @@ impl Viewer {
         Ok(self.renderer.read_pixels()?)
     }
 
+    /// The files of a map that is being made.
+    pub fn followed(&self) -> Option<&Follow> {
+        self.follow.as_ref()
+    }
+
+    /// Hides the panel.
+    pub fn hide_panel(&mut self) {
+        self.panel = false;
+    }
+
     /// Ends; returns the messages of the validation layer.
     pub fn end(self) -> Vec<String> {
         self.renderer.validation_messages()
@@ -270,6 +289,8 @@ impl Viewer {
     pub fn frame(&mut self, input: RawInput, passed: Duration) -> Result<Frame> {
         match self.stage {
             Stage::Opens => self.stage = Stage::Loads,
+            // loads what it is sent
+            Stage::Loads if self.follow.is_some() => self.stage = Stage::Shows,
             Stage::Loads => {
                 self.load()?;
                 self.stage = Stage::Shows;
@@ -278,6 +299,7 @@ impl Viewer {
         }
         let seconds = passed.as_secs_f32();
         self.frame_seconds += (seconds - self.frame_seconds) * 0.1;
+        self.follow_watched();
         let collecting = self.follow_files();
         self.follow_finder();
         let begin = Instant::now();
@@ -292,17 +314,20 @@ impl Viewer {
         self.change(&changes)?;
         let moved = self.advance(seconds);
         self.draw(ui)?;
+        self.note_shown();
         let wants = self.gui.context().has_requested_repaint();
-        let rests = self.is_ready() && (!self.animates || self.shown == Shown::Reference);
+        let waits = self.follow.is_some() && self.map.is_none();
+        let rests = waits || self.is_ready() && (!self.animates || self.shown == Shown::Reference);
         Ok(Frame {
             output,
             at_rest: rests && !moved && !collecting && !wants && changes.is_empty(),
         })
     }
 
-    /// Whether the traced look can be shown.
+    /// Whether the traced look can be shown. A map that is being made has the light of its directives and entities until
+    /// the search for its lights has ended.
     pub(super) fn can_trace(&self) -> bool {
-        self.found
+        self.found || self.follow.is_some()
     }
 
     /// The list of lights, once they are found and traced.
@@ -317,6 +342,7 @@ impl Viewer {
             self.editor = before
                 .zip(now)
                 .map(|(before, now)| Editor::new(before, now));
+            self.restore_edits();
         }
     }
 
@@ -439,14 +465,20 @@ impl Viewer {
 
     /// Draws the looks, then the panels.
     fn draw(&mut self, ui: renderer_vk::api::UiFrame) -> Result<()> {
-        let traces = self.shown.is_traced() && self.found;
+        let traces = self.shown.is_traced() && self.can_trace();
         let drawn = match self.shown {
             Shown::Hybrid => Look::Hybrid,
             _ => Look::Classic,
         };
         self.settings.rt = if traces { Look::Traced } else { drawn };
         self.settings.rt_accumulate = self.shown == Shown::Reference;
-        self.renderer.set_settings(&self.settings);
+        match self.found || self.follow.is_none() {
+            true => self.renderer.set_settings(&self.settings),
+            false => self.renderer.set_settings(&Settings {
+                rt_lights: MapLightChoice::Prior,
+                ..self.settings.clone()
+            }),
+        }
         self.renderer.begin_frame((self.time * 1000.0) as i32);
         let def = self.view();
         // after a failed reload there may be none

@@ -52,6 +52,7 @@ fn viewer(folder: &Path, map: &str) -> Option<Viewer> {
                 },
             },
             lights: None,
+            followed: None,
         },
         cache: folder.join("cache"),
         shown: Shown::Classic,

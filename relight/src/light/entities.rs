@@ -6,8 +6,9 @@
 
 use super::{
     AMBIENT_RADIANCE, DEFAULT_POINT_LIGHT_RADIUS, DEFAULT_SUN_RADIUS, Falloff,
-    POINT_LIGHT_INTENSITY, PointLight, SUN_IRRADIANCE, Spot, SunLight,
+    POINT_LIGHT_INTENSITY, PointLight, SUN_IRRADIANCE, Spot, SunLight, raise,
 };
+use crate::world::RelitWorld;
 use glam::Vec3;
 use q3bsp::Entity;
 
@@ -123,6 +124,32 @@ pub(crate) fn ambient(entities: &[Entity]) -> Vec3 {
     };
     let value = positive(&["_ambient", "ambient"]).max(positive(&["_minlight"]));
     color(world) * (value * AMBIENT_RADIANCE)
+}
+
+impl RelitWorld {
+    /// Replaces the point lights, the suns and the ambient term of entities by those of others, and rebuilds the light
+    /// lists. False, and no change, if the [light of a map without any](super::fallback) was needed or would be: loading
+    /// finds that.
+    pub fn replace_light_entities(&mut self, entities: &[Entity]) -> bool {
+        let (mut points, mut suns) = light_entities(entities);
+        let ambient = raise(ambient(entities), self.color_exponent);
+        let strengths = points.iter_mut().map(|l| &mut l.intensity);
+        for strength in strengths.chain(suns.iter_mut().map(|s| &mut s.irradiance)) {
+            *strength = raise(*strength, self.color_exponent);
+        }
+        // those of skies follow those of entities
+        suns.extend(self.suns.iter().filter(|sun| sun.material.is_some()));
+        if self.report.fallback || points.len() + suns.len() + self.lights.len() == 0 {
+            return false;
+        }
+        self.point_lights = points;
+        self.suns = suns;
+        self.ambient = ambient;
+        self.report.point_lights = self.point_lights.len();
+        self.report.suns = self.suns.len();
+        super::build_lists(self);
+        true
+    }
 }
 
 /// Whether an entity class lights the world. (`lightJunior` lights moving models only.)

@@ -176,6 +176,22 @@ impl Renderer {
         Ok(read)
     }
 
+    /// Replaces the lights of the map's entities by those of others, and reads files by hand again; accumulation restarts.
+    /// False, and no change, without a map or if it must be loaded again for that.
+    ///
+    /// # Errors
+    /// The device is out of memory or lost.
+    pub fn light_by_entities(&mut self, entities: &[q3bsp::Entity]) -> Result<bool, Error> {
+        let (Some(world), Some(assets)) = (&mut self.world, &mut self.assets) else {
+            return Ok(false);
+        };
+        let changed = world.light_by_entities(entities, assets);
+        if let Some(trace) = self.trace.as_mut().filter(|_| changed) {
+            trace.change_lights(world, assets)?;
+        }
+        Ok(changed)
+    }
+
     /// Number of frames in the mean of `rt_accumulate`; 0 without a traced view.
     pub fn accumulated_frames(&self) -> u32 {
         (self.trace.as_ref()).map_or(0, TraceLook::accumulated_frames)

@@ -229,6 +229,15 @@ struct Lit {
     found: bool,
 }
 
+/// Whether light lists are reduced by visibility rays.
+#[derive(Clone, Copy)]
+enum Sweep<'a> {
+    /// They are, unless the cache has the result.
+    Cached(Option<&'a relight::CalibrationCache>),
+    /// They stay as they are.
+    None,
+}
+
 /// Time and result of a change of a map's lights.
 #[derive(Clone, Debug, Default)]
 pub struct LightsChanged {
@@ -427,11 +436,11 @@ impl World {
         for warning in relit.warnings.iter().skip(warned) {
             log::warn!("{}: {warning}", relit.name);
         }
-        self.read_by_hand(assets, cache);
+        self.read_by_hand(assets, Sweep::Cached(cache));
     }
 
     /// Applies the files by hand to the map's own lights and materials, sweeps the light lists and marks emitters.
-    fn read_by_hand(&mut self, assets: &mut Assets, cache: Option<&relight::CalibrationCache>) {
+    fn read_by_hand(&mut self, assets: &mut Assets, sweep: Sweep<'_>) {
         let files = std::sync::Arc::clone(assets.textures.files());
         let relit = &mut self.data.relit;
         let warned = relit.warnings.len();
@@ -445,7 +454,10 @@ impl World {
         if relit.light_by_hand(&*files) {
             log::info!("{}: lights as in {}", relit.name, relit.lights_file());
         }
-        let swept = relight::light::sweep(relit, cache);
+        let swept = match sweep {
+            Sweep::None => None,
+            Sweep::Cached(cache) => Some(relight::light::sweep(relit, cache)),
+        };
         let names = assets.materials.iter().map(|m| m.name.as_str());
         let own = relit.materials.iter().map(|m| m.name.as_str());
         let unmatched = by_hand.unmatched(&relit.name, &own.chain(names).collect::<Vec<_>>());
@@ -455,18 +467,20 @@ impl World {
         for warning in relit.warnings.iter().skip(warned) {
             log::warn!("{}: {warning}", relit.name);
         }
-        log::debug!(
-            "{}: visibility sweep of light lists {} {:.2} s, {} of {} entries left",
-            relit.name,
-            if swept.cached {
-                "read from the cache in"
-            } else {
-                "took"
-            },
-            swept.seconds,
-            swept.entries[1],
-            swept.entries[0]
-        );
+        if let Some(swept) = swept {
+            log::debug!(
+                "{}: visibility sweep of light lists {} {:.2} s, {} of {} entries left",
+                relit.name,
+                if swept.cached {
+                    "read from the cache in"
+                } else {
+                    "took"
+                },
+                swept.seconds,
+                swept.entries[1],
+                swept.entries[0]
+            );
+        }
         self.mark_emitters(assets);
     }
 
@@ -482,7 +496,7 @@ impl World {
             return has_read;
         };
         self.data.relit.set_lighting(before.files);
-        self.read_by_hand(assets, None);
+        self.read_by_hand(assets, Sweep::Cached(None));
         true
     }
 
@@ -517,6 +531,28 @@ impl World {
             unknown,
             seconds: begin.elapsed().as_secs_f64(),
         }
+    }
+
+    /// Replaces lights of the map's entities by those of others, below those by hand, which are read again. The light
+    /// lists are not swept, because that takes up to seconds: they have all lights that could arrive. False if that needs
+    /// the map to be loaded again.
+    pub(crate) fn light_by_entities(
+        &mut self,
+        entities: &[q3bsp::Entity],
+        assets: &mut Assets,
+    ) -> bool {
+        let relit = &mut self.data.relit;
+        let Some(before) = &self.before else {
+            return relit.replace_light_entities(entities);
+        };
+        let now = relit.lighting();
+        relit.set_lighting(before.files.clone());
+        if !relit.replace_light_entities(entities) {
+            relit.set_lighting(now);
+            return false;
+        }
+        self.read_by_hand(assets, Sweep::None);
+        true
     }
 
     /// Marks the materials that are in the light lists.
