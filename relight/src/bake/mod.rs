@@ -9,12 +9,18 @@
 //! 5. [`Baked::store`] encodes the light ([`Encoding`]) and changes the map's lumps of light, nothing else.
 //!
 //! Light is irradiance over π: the outgoing radiance of a white surface, in display units ([`emitters`](crate::emitters)).
+//!
+//! * [`layout`]: new lightmap coordinates.
+//! * [`seams`]: equal light on both sides of an edge between two charts.
 
 mod coverage;
 mod encode;
 mod gather;
 mod grid;
+pub mod layout;
+mod page;
 mod rays;
+pub mod seams;
 mod smooth;
 mod store;
 mod targets;
@@ -23,6 +29,7 @@ mod tests;
 
 pub use encode::Encoding;
 pub use gather::{Gather, GatherError, GatherProgress, Light, LitSurfaces, LitTriangle, Point};
+pub use page::{Page, light_bytes};
 pub use rays::Rays;
 pub use store::Stored;
 
