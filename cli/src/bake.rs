@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use q3bsp::Bsp;
+use q3bsp::{Bsp, Entity, map_text};
 use relight::bake::{BakeOptions, BakeStage, Baked, Gather, Rays, Stored, bake};
 use relight::export::Output;
 use relight::light::LightColor;
@@ -85,7 +85,9 @@ fn bake_map(args: &BakeArgs, map: &str, output: &Path) -> Result<()> {
     let bytes = files.read(&name)?;
     let bytes = bytes.with_context(|| format!("{name}: no such file in the game folders"))?;
     let original = Bsp::parse(&bytes).with_context(|| name.clone())?;
-    let world = load(args, &*files, &name, original.clone())?;
+    let mut lit = original.clone();
+    add_lights_of_source(&mut lit, map)?;
+    let world = load(args, &*files, &name, lit)?;
     let loaded = begin.elapsed();
     let options = options(args, &world);
     let mut gather = Rays::new(&world);
@@ -113,6 +115,41 @@ fn bake_map(args: &BakeArgs, map: &str, output: &Path) -> Result<()> {
         },
         gather.name(),
     );
+    Ok(())
+}
+
+/// Adds the light entities of the `.map` file beside a `.bsp` file: compilers leave them out of the map, and read that file
+/// for light. Does nothing for a map without that file, or with light entities of its own.
+///
+/// # Errors
+/// The file cannot be read.
+fn add_lights_of_source(bsp: &mut Bsp, map: &str) -> Result<()> {
+    let source = Path::new(map).with_extension("map");
+    let own = bsp.entities();
+    let is_light = |entity: &Entity| entity.classname().to_ascii_lowercase().starts_with("light");
+    if !Path::new(map).is_file() || !source.is_file() || own.iter().any(is_light) {
+        return Ok(());
+    }
+    let text = std::fs::read(&source).with_context(|| format!("{}", source.display()))?;
+    let entities = map_text::parse(&text).with_context(|| format!("{}", source.display()))?;
+    let mut lights = String::new();
+    let mut count = 0;
+    for entity in entities.iter().map(|e| &e.entity) {
+        // lights point at others
+        if is_light(entity) || entity.get("targetname").is_some() {
+            count += usize::from(is_light(entity));
+            lights.push_str("{\n");
+            for (key, value) in &entity.pairs {
+                lights.push_str(&format!("\"{key}\" \"{value}\"\n"));
+            }
+            lights.push_str("}\n");
+        }
+    }
+    while bsp.entities.last().is_some_and(|byte| *byte == 0) {
+        bsp.entities.pop();
+    }
+    bsp.entities.extend_from_slice(lights.as_bytes());
+    log::info!("{}: {count} light entities", source.display());
     Ok(())
 }
 

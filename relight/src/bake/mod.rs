@@ -22,7 +22,7 @@ mod page;
 mod rays;
 pub mod seams;
 mod smooth;
-mod store;
+mod lumps;
 mod targets;
 #[cfg(test)]
 mod tests;
@@ -31,7 +31,7 @@ pub use encode::Encoding;
 pub use gather::{Gather, GatherError, GatherProgress, Light, LitSurfaces, LitTriangle, Point};
 pub use page::{Page, light_bytes};
 pub use rays::Rays;
-pub use store::Stored;
+pub use lumps::Stored;
 
 use crate::calibrate::Dirt;
 use crate::occluders::Occluders;
