@@ -12,17 +12,19 @@
 //!
 //! * [`layout`]: new lightmap coordinates.
 //! * [`seams`]: equal light on both sides of an edge between two charts.
+//! * [`store`]: pages written into a map, beside it, and into packs.
 
 mod coverage;
 mod encode;
 mod gather;
 mod grid;
 pub mod layout;
+mod lumps;
 mod page;
 mod rays;
 pub mod seams;
 mod smooth;
-mod lumps;
+pub mod store;
 mod targets;
 #[cfg(test)]
 mod tests;
