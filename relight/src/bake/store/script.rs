@@ -8,7 +8,7 @@ use shaderscript::token::{Lexer, Reading, Token};
 /// the engine makes of its image.
 ///
 /// The engine shifts pages in a map by the overbright bits and not images, which therefore have the shifted light. `rgbGen
-/// identityLighting` in place of `identity` then gives the same picture with every `r_overBrightBits`.
+/// identityLighting` then gives the same picture with every `r_overBrightBits`.
 pub(super) fn with_image(
     files: &dyn GameFiles,
     materials: &Materials,
@@ -20,7 +20,7 @@ pub(super) fn with_image(
         let name = shaderscript::strip_extension(name);
         format!(
             "{{\n\t{{\n\t\tmap {image}\n\t\ttcGen lightmap\n\t\trgbGen identityLighting\n\t}}\n\
-             \t{{\n\t\tmap {name}.tga\n\t\tblendFunc GL_DST_COLOR GL_ZERO\n\t\trgbGen identity\n\t}}\n}}\n"
+             \t{{\n\t\tmap {name}.tga\n\t\tblendFunc GL_DST_COLOR GL_ZERO\n\t\trgbGen identityLighting\n\t}}\n}}\n"
         )
     })
 }
@@ -54,88 +54,162 @@ fn definition(files: &dyn GameFiles, materials: &Materials, name: &str) -> Optio
     None
 }
 
+/// A line of a definition: how many braces are open, and its words.
+type Line = (usize, Vec<String>);
+
 /// The definition as text with the image in its stages of the lightmap.
 fn replaced(tokens: &[Token], image: &str) -> String {
-    let mut lines: Vec<(usize, Vec<String>)> = Vec::new();
+    let mut body = Vec::new();
+    let mut stages: Vec<Vec<Line>> = Vec::new();
     let mut depth = 0usize;
-    let mut stage = 0;
     for token in tokens {
         match token.text.as_str() {
             "{" => {
-                lines.push((depth, vec!["{".to_owned()]));
                 depth += 1;
-                stage = lines.len();
-            }
-            "}" => {
-                depth = depth.saturating_sub(1);
-                if depth == 1 {
-                    let of_stage = lines.split_off(stage.min(lines.len()));
-                    lines.extend(stage_with(of_stage, image));
+                if depth == 2 {
+                    // where the stage stands
+                    body.push((1, Vec::new()));
+                    stages.push(Vec::new());
                 }
-                lines.push((depth, vec!["}".to_owned()]));
-                // what follows a stage is no part of it
-                stage = lines.len();
             }
+            "}" => depth = depth.saturating_sub(1),
             word => {
                 let word = match word.contains(|c: char| c <= ' ') {
                     true => format!("\"{word}\""),
                     false => word.to_owned(),
                 };
+                let lines = match stages.last_mut() {
+                    Some(stage) if depth > 1 => stage,
+                    _ => &mut body,
+                };
                 match lines.last_mut() {
-                    Some((_, line)) if !token.starts_line && !is_brace(line) => line.push(word),
+                    Some((_, line)) if !token.starts_line && !line.is_empty() => line.push(word),
                     _ => lines.push((depth, vec![word])),
                 }
             }
         }
     }
-    let mut text = String::new();
-    for (depth, line) in lines {
-        text += &"\t".repeat(depth);
-        text += &line.join(" ");
-        text.push('\n');
+    show_image(&mut stages, image);
+    let mut text = "{\n".to_owned();
+    let mut stages = stages.into_iter();
+    for line in body {
+        match line.1.is_empty() {
+            true => {
+                text += "\t{\n";
+                stages
+                    .next()
+                    .iter()
+                    .flatten()
+                    .for_each(|line| write(&mut text, line));
+                text += "\t}\n";
+            }
+            false => write(&mut text, &line),
+        }
     }
-    text
+    text + "}\n"
 }
 
-fn is_brace(line: &[String]) -> bool {
-    line.first().is_some_and(|word| word == "{" || word == "}")
+fn write(text: &mut String, (depth, words): &Line) {
+    *text += &"\t".repeat(*depth);
+    *text += &words.join(" ");
+    text.push('\n');
 }
 
-/// Lines of a stage, changed if it shows the page.
-fn stage_with(mut lines: Vec<(usize, Vec<String>)>, image: &str) -> Vec<(usize, Vec<String>)> {
-    let is = |word: &str, name: &str| word.eq_ignore_ascii_case(name);
-    let is_page = |line: &[String]| match line {
+fn is(word: &str, name: &str) -> bool {
+    word.eq_ignore_ascii_case(name)
+}
+
+/// Whether a line of a stage names the page.
+fn is_page(line: &[String]) -> bool {
+    match line {
         [keyword, page, ..] => {
             (is(keyword, "map") || is(keyword, "clampMap"))
                 && (is(page, "$lightmap") || is(page, "*lightmap"))
         }
         _ => false,
-    };
-    if !lines.iter().any(|(_, line)| is_page(line)) {
-        return lines;
     }
-    let mut depth = 2;
-    let mut generated = false;
-    for (at, line) in &mut lines {
-        depth = *at;
-        if is_page(line) {
-            *line = vec!["map".to_owned(), image.to_owned()];
+}
+
+/// Puts the image into the stages that show the page.
+///
+/// Engines draw the first two stages at once, with the colour of the first, if one multiplies the other and both have the
+/// same `rgbGen` and nothing else in particular (`CollapseMultitexture`). That stays: where both are `identity`, both become
+/// `identityLighting`. Two passes would darken triangles that compilers left double.
+fn show_image(stages: &mut [Vec<Line>], image: &str) {
+    let shows: Vec<bool> = (stages.iter())
+        .map(|stage| stage.iter().any(|(_, line)| is_page(line)))
+        .collect();
+    let together = match stages {
+        [first, second, ..] => {
+            is_plain(first) && is_plain(second) && !blends(first) && multiplies(second)
         }
-        if let [keyword, kind, ..] = &mut line[..]
-            && is(keyword, "rgbGen")
-        {
-            generated = true;
-            if is(kind, "identity") {
-                *kind = "identityLighting".to_owned();
+        _ => false,
+    };
+    let of_pair = together && shows.iter().take(2).filter(|shows| **shows).count() == 1;
+    for (number, (stage, shows)) in stages.iter_mut().zip(shows).enumerate() {
+        let changes = shows || (of_pair && number < 2);
+        if !changes {
+            continue;
+        }
+        let mut generated = false;
+        for (_, line) in stage.iter_mut() {
+            if is_page(line) {
+                *line = vec!["map".to_owned(), image.to_owned()];
+            }
+            if let [keyword, kind, ..] = &mut line[..]
+                && is(keyword, "rgbGen")
+            {
+                generated = true;
+                if is(kind, "identity") {
+                    *kind = "identityLighting".to_owned();
+                }
             }
         }
+        let mut add = |words: [&str; 2]| stage.push((2, words.map(str::to_owned).to_vec()));
+        if shows {
+            add(["tcGen", "lightmap"]);
+        }
+        if !generated {
+            add(["rgbGen", "identityLighting"]);
+        }
     }
-    let mut add = |words: [&str; 2]| lines.push((depth, words.map(str::to_owned).to_vec()));
-    add(["tcGen", "lightmap"]);
-    if !generated {
-        add(["rgbGen", "identityLighting"]);
-    }
-    lines
+}
+
+/// The words of a stage's blend function.
+fn blend(stage: &[Line]) -> Option<&[String]> {
+    let mut lines = stage.iter();
+    lines.find_map(|(_, line)| match &line[..] {
+        [keyword, kinds @ ..] if is(keyword, "blendFunc") => Some(kinds),
+        _ => None,
+    })
+}
+
+fn blends(stage: &[Line]) -> bool {
+    blend(stage).is_some()
+}
+
+fn multiplies(stage: &[Line]) -> bool {
+    blend(stage).is_some_and(|kinds| match kinds {
+        [kind] => is(kind, "filter"),
+        [from, to] => {
+            (is(from, "GL_DST_COLOR") && is(to, "GL_ZERO"))
+                || (is(from, "GL_ZERO") && is(to, "GL_SRC_COLOR"))
+        }
+        _ => false,
+    })
+}
+
+/// Whether a stage has an image, coordinates, blending and at most a constant colour.
+fn is_plain(stage: &[Line]) -> bool {
+    stage.iter().all(|(_, line)| match &line[..] {
+        [keyword, kind, ..] if is(keyword, "rgbGen") => {
+            is(kind, "identity") || is(kind, "identityLighting")
+        }
+        [keyword, ..] => ["map", "clampMap", "blendFunc", "tcGen", "tcMod"]
+            .iter()
+            .any(|known| is(keyword, known)),
+        [] => true,
+    })
 }
 
 #[cfg(test)]
@@ -164,13 +238,24 @@ mod tests {
             text,
             "{\n\tsurfaceparm nomarks\n\tq3map_surfacelight 200\n\t{\n\t\tmap maps/m/lm_0000.tga\n\
              \t\trgbGen identityLighting\n\t\ttcGen lightmap\n\t}\n\t{\n\t\tmap textures/wall.tga\n\
-             \t\tblendFunc filter\n\t\trgbGen identity\n\t}\n\tcull none\n}\n"
+             \t\tblendFunc filter\n\t\trgbGen identityLighting\n\t}\n\tcull none\n}\n"
         );
         let shader = parse_script("s", format!("new\n{text}").as_bytes())
             .shaders
             .remove(0);
         assert_eq!(baked_light(&shader.stages)[0], Some(BakedLight::Main));
         assert_eq!(shader.surface_params, ["nomarks"]);
+    }
+
+    #[test]
+    fn stages_that_engines_do_not_join_keep_their_colour() {
+        let cut_out = "grate\n{\n{\nmap a.tga\nalphaFunc GE128\ndepthWrite\nrgbGen identity\n}\n\
+            {\nmap $lightmap\nblendFunc filter\ndepthFunc equal\n}\n}\n";
+        let text = written(cut_out, "grate");
+        assert!(text.contains("\t\trgbGen identity\n"), "{text}");
+        assert!(
+            text.contains("depthFunc equal\n\t\ttcGen lightmap\n\t\trgbGen identityLighting\n")
+        );
     }
 
     #[test]
