@@ -1,17 +1,26 @@
 //! `relight bake`: light of a map's sources, written into the map.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
-use clap::Args;
+use anyhow::{Context, Result, anyhow, bail};
+use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use q3bsp::{Bsp, Entity, map_text};
-use relight::bake::{BakeOptions, BakeStage, Baked, Gather, Rays, Stored, bake};
+use relight::bake::layout::{self, LayoutOptions, LightmapUse, PageSides};
+use relight::bake::store::deluxe::{DirectionSpace, interleave};
+use relight::bake::store::external::{numbered, scripted};
+use relight::bake::store::pack::{RelitMap, relit_pack};
+use relight::bake::store::{self, GameFile};
+use relight::bake::{
+    BakeOptions, BakeStage, Baked, BakedPage, Gather, Page, Rays, Stored, bake, light_bytes, seams,
+};
 use relight::export::Output;
 use relight::light::LightColor;
 use relight::{
-    CalibrationCache, CalibrationOptions, GameFiles, Options, RelitWorld, external_lightmaps,
+    CalibrationCache, CalibrationOptions, GameFiles, Materials, Options, RelitWorld,
+    external_lightmaps,
 };
 
 use crate::game::Maps;
@@ -24,13 +33,13 @@ use crate::view::open;
 /// Writes lightmaps, vertex colours and the light grid anew; everything else in the map stays as it is. The light of a
 /// finished map comes from sources that calibration finds; that of a map without lightmaps from its scripts and entities.
 ///
-/// Examples: relight bake oa_dm1 -o oa_dm1.bsp; relight bake mymap.bsp -o mymap.bsp --bounce 4;
+/// Examples: relight bake oa_dm1 -o z_oa_dm1_relit.pk3 --texels 4; relight bake mymap.bsp -o mymap.bsp --bounce 4;
 /// relight bake oa_dm1 kaos2 -o baked
 #[derive(Args, Debug)]
 pub struct BakeArgs {
     #[command(flatten)]
     maps: Maps,
-    /// Output file, or for several maps the folder
+    /// Output file, .bsp or .pk3, or for several maps the folder
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// Do not fit lights to the map's lightmaps first (the game does)
@@ -60,6 +69,25 @@ pub struct BakeArgs {
     /// Leave the light grid, which lights models, as it is
     #[arg(long)]
     no_grid: bool,
+    /// Lay the lightmaps out anew, with so many texels along an axis in place of one; maps without lightmaps get some anyway
+    #[arg(long, value_name = "N", value_parser = positive)]
+    texels: Option<f32>,
+    /// Write lightmaps as images of up to 2048 texels a side beside the map: named by scripts, which every engine loads, or
+    /// numbered
+    #[arg(long, value_name = "KIND", num_args = 0..=1, default_missing_value = "scripted")]
+    external: Option<External>,
+    /// Write pages of directions to the light between those of light, for engines with deluxe mapping
+    #[arg(long)]
+    deluxe: bool,
+}
+
+/// How images beside a map are found.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+enum External {
+    /// By scripts, which every engine loads
+    Scripted,
+    /// By number: maps/NAME/lm_0000.tga
+    Numbered,
 }
 
 /// Runs the command.
@@ -78,43 +106,179 @@ pub fn run(args: &BakeArgs) -> Result<()> {
     Ok(())
 }
 
+/// A map, and the game that it is of.
+struct Source {
+    files: Arc<dyn GameFiles>,
+    materials: Materials,
+    /// Game path.
+    name: String,
+    /// The file.
+    bytes: Vec<u8>,
+    bsp: Bsp,
+}
+
 /// Bakes one map.
 fn bake_map(args: &BakeArgs, map: &str, output: &Path) -> Result<()> {
     let begin = Instant::now();
     let (files, name) = open(map, &args.maps.game)?;
     let bytes = files.read(&name)?;
     let bytes = bytes.with_context(|| format!("{name}: no such file in the game folders"))?;
-    let original = Bsp::parse(&bytes).with_context(|| name.clone())?;
-    let mut lit = original.clone();
+    let bsp = Bsp::parse(&bytes).with_context(|| name.clone())?;
+    let source = Source {
+        materials: load_scripts(&*files).0,
+        files,
+        name,
+        bytes,
+        bsp,
+    };
+    let mut lit = source.bsp.clone();
     add_lights_of_source(&mut lit, map)?;
-    let world = load(args, &*files, &name, lit)?;
+    let mut world = load(args, &source, lit)?;
+    let mut changed = source.bsp.clone();
+    // numbered images beside the map are its pages
+    let mut external = args.external;
+    if external_lightmaps(&mut changed, &*source.files, &source.name).is_ok_and(|count| count > 0) {
+        external = external.or(Some(External::Numbered));
+    }
+    let laid_out = args.texels.is_some() || args.external.is_some() || !has_pages(&world);
+    if laid_out {
+        lay_out(args, &source, &mut changed)?;
+        world = with_layout(&source, &changed, world);
+    }
     let loaded = begin.elapsed();
     let options = options(args, &world);
     let mut gather = Rays::new(&world);
     let baked = bake_with_bar(&world, &mut gather, &options)?;
-    let mut changed = original.clone();
-    let stored = baked.store(&world, &mut changed, options.encoding);
-    if stored == Stored::default() {
+    let encoding = options.encoding;
+    let mut pages = baked.pages(&world, &changed, encoding);
+    if laid_out {
+        seams::match_seams(&world, &mut pages);
+    }
+    let stored = baked.store_beside_pages(&world, &mut changed, encoding);
+    if baked.pages.is_empty() && stored == Stored::default() {
         bail!(
-            "{name}: nothing in it stores light: no lightmaps, no vertices that are lit, no light grid"
+            "{}: nothing in it stores light: no lightmaps, no vertices that are lit, no light grid",
+            source.name
         );
     }
-    let mut out = Output::new(output);
-    out.write_main(&changed.write())?;
-    out.finish()?;
-    report(&name, &stored, &baked, &original, &changed);
+    report(&source, &stored, &baked, (!laid_out).then_some(&pages));
+    if args.deluxe {
+        let directions = baked.directions(&world, &changed, DirectionSpace::Model);
+        pages = interleave(&mut changed, pages, directions, DirectionSpace::Model);
+    }
+    let beside = match external {
+        None => {
+            store::internal(&mut changed, &pages)?;
+            Vec::new()
+        }
+        Some(External::Numbered) => numbered(&mut changed, &source.name, &pages)?,
+        Some(External::Scripted) => {
+            let (files, materials) = (&*source.files, &source.materials);
+            scripted(&mut changed, &source.name, &pages, files, materials)?
+        }
+    };
+    write(&source, &changed, &beside, output)?;
     println!(
         "{}: {:.1} s, {:.1} s of these for {} by {}",
         output.display(),
         begin.elapsed().as_secs_f64(),
         loaded.as_secs_f64(),
-        if world.calibration.is_some() {
-            "lights found by calibration"
-        } else {
-            "loading"
+        match world.calibration.is_some() {
+            true => "loading and finding the lights",
+            false => "loading",
         },
         gather.name(),
     );
+    Ok(())
+}
+
+/// Whether surfaces of a world have lightmaps.
+fn has_pages(world: &RelitWorld) -> bool {
+    world.surfaces.iter().any(|surface| surface.light_page >= 0)
+}
+
+/// Gives a map new lightmap coordinates.
+fn lay_out(args: &BakeArgs, source: &Source, bsp: &mut Bsp) -> Result<()> {
+    let material = |name: &str| LightmapUse::of(&source.materials, name);
+    let usual = match args.external {
+        Some(_) => LayoutOptions::external(&material),
+        None => LayoutOptions {
+            sides: PageSides::Fixed(bsp.format.lightmap_size() as u32),
+            ..LayoutOptions::internal(&material)
+        },
+    };
+    let options = LayoutOptions {
+        finer: args.texels.unwrap_or(1.0),
+        ..usual
+    };
+    let laid = layout::make(bsp, &options).with_context(|| source.name.clone())?;
+    println!(
+        "{}: {} charts in {} pages of {} texels a side, {:.0} % filled",
+        source.name,
+        laid.charts,
+        laid.pages,
+        laid.side,
+        laid.efficiency() * 100.0
+    );
+    if !laid.coarser.is_empty() {
+        log::warn!(
+            "{}: {} charts are larger than a page and have coarser texels",
+            source.name,
+            laid.coarser.len()
+        );
+    }
+    Ok(())
+}
+
+/// The world of a map with a new layout, with the light of the one before.
+fn with_layout(source: &Source, bsp: &Bsp, before: RelitWorld) -> RelitWorld {
+    let options = Options {
+        calibrate: None,
+        by_hand: false,
+        light_color: LightColor::Stored,
+        ..Options::default()
+    };
+    let (files, materials) = (&*source.files, &source.materials);
+    let mut world = RelitWorld::from_bsp(files, materials, &source.name, bsp.clone(), options);
+    world.measure_materials(files);
+    world.set_lighting(before.lighting());
+    world
+}
+
+/// Writes a map with the files beside it, or a pack of them.
+fn write(source: &Source, bsp: &Bsp, beside: &[GameFile], output: &Path) -> Result<()> {
+    let mut out = Output::new(output);
+    let bytes = bsp.write();
+    let is_pack = output
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("pk3"));
+    if is_pack {
+        let aas = Path::new(&source.name).with_extension("aas");
+        let aas = source.files.read(&aas.to_string_lossy())?;
+        let pack = relit_pack(RelitMap {
+            map: &source.name,
+            original: &source.bytes,
+            relit: &bytes,
+            aas: aas.as_deref(),
+            files: beside,
+        });
+        let pack = pack.map_err(|problem| anyhow!("{}: {problem}", output.display()))?;
+        for note in &pack.notes {
+            log::warn!("{}: {note}", source.name);
+        }
+        out.write_main(&pack.bytes)?;
+    } else {
+        for file in beside {
+            // the map lies in the folder `maps` of a game
+            let name = match file.path.strip_prefix("maps/") {
+                Some(name) => name.to_owned(),
+                None => format!("../{}", file.path),
+            };
+            out.write_beside(&name, &file.bytes)?;
+        }
+        out.write_main(&bytes)?;
+    }
+    out.finish()?;
     Ok(())
 }
 
@@ -154,24 +318,23 @@ fn add_lights_of_source(bsp: &mut Bsp, map: &str) -> Result<()> {
 }
 
 /// Loads a map with light as it is stored.
-fn load(args: &BakeArgs, files: &dyn GameFiles, name: &str, mut bsp: Bsp) -> Result<RelitWorld> {
-    let (materials, _) = load_scripts(files);
-    let external = external_lightmaps(&mut bsp, files, name);
-    let calibrate =
-        (!args.no_calibration && !bsp.lightmaps.is_empty()).then(|| CalibrationOptions {
-            cache: args.cache.as_ref().map(CalibrationCache::new),
-            ..CalibrationOptions::default()
-        });
-    let is_calibrated = calibrate.is_some();
+fn load(args: &BakeArgs, source: &Source, mut bsp: Bsp) -> Result<RelitWorld> {
+    let files = &*source.files;
+    let external = external_lightmaps(&mut bsp, files, &source.name);
+    let stored = !bsp.lightmaps.is_empty() && !args.no_calibration;
+    let calibrate = stored.then(|| CalibrationOptions {
+        cache: args.cache.as_ref().map(CalibrationCache::new),
+        ..CalibrationOptions::default()
+    });
     let options = Options {
         calibrate,
         by_hand: false,
         light_color: LightColor::Stored,
         ..Options::default()
     };
-    let mut world = RelitWorld::from_bsp(files, &materials, name, bsp, options);
+    let mut world = RelitWorld::from_bsp(files, &source.materials, &source.name, bsp, options);
     world.warnings.extend(external.err());
-    if !is_calibrated {
+    if world.calibration.is_none() {
         world.measure_materials(files);
     }
     world.read_by_hand(files);
@@ -223,11 +386,16 @@ fn bake_with_bar(
     Ok(baked?)
 }
 
-/// Prints what was baked, and how far it is from the light that the map had.
-fn report(name: &str, stored: &Stored, baked: &Baked, before: &Bsp, after: &Bsp) {
+/// Prints what was baked; for a map that keeps its coordinates also how far its pages are from those that it had.
+fn report(source: &Source, stored: &Stored, baked: &Baked, pages: Option<&Vec<Page>>) {
+    let name = &source.name;
+    let lit = |page: &BakedPage| page.owners.iter().filter(|o| **o != u32::MAX).count();
+    let texels: usize = baked.pages.iter().map(lit).sum();
     println!(
-        "{name}: {} pages ({} texels), {} vertices, {} points of the light grid",
-        stored.pages, stored.texels, stored.vertices, stored.grid
+        "{name}: {} pages ({texels} texels), {} vertices, {} points of the light grid",
+        baked.pages.len(),
+        stored.vertices,
+        stored.grid
     );
     if baked.unlit > 0 {
         log::warn!(
@@ -235,41 +403,29 @@ fn report(name: &str, stored: &Stored, baked: &Baked, before: &Bsp, after: &Bsp)
             baked.unlit
         );
     }
-    if stored.outside > 0 {
-        log::warn!(
-            "{name}: {} lightmap images that scripts name stay as they are",
-            stored.outside
-        );
+    let outside = baked.pages_outside(&source.bsp);
+    if outside > 0 {
+        log::warn!("{name}: {outside} lightmap images that scripts name stay as they are");
     }
     let mut differences: Vec<u8> = Vec::new();
-    for page in &baked.pages {
-        let (Some(old), Some(new)) = (
-            before.lightmaps.get(page.number),
-            after.lightmaps.get(page.number),
-        ) else {
+    for baked in &baked.pages {
+        let old = source.bsp.lightmaps.get(baked.number);
+        let new = pages.and_then(|pages| pages.get(baked.number));
+        let (Some(old), Some(new)) = (old, new) else {
             continue;
         };
-        let texels = old
-            .0
-            .as_chunks::<3>()
-            .0
-            .iter()
-            .zip(new.0.as_chunks::<3>().0);
-        let covered = texels
-            .zip(&page.owners)
-            .filter(|(_, owner)| **owner != u32::MAX);
+        let texels = old.0.as_chunks::<3>().0.iter().zip(&new.texels);
+        let covered = texels.zip(&baked.owners).filter(|(_, o)| **o != u32::MAX);
         differences.extend(covered.flat_map(|((old, new), _)| {
-            let channels = old.iter().zip(new);
-            channels.map(|(old, new)| old.abs_diff(*new))
+            let new = light_bytes(*new);
+            (0..3).map(move |k| old[k].abs_diff(new[k]))
         }));
     }
     if !differences.is_empty() {
         differences.sort_unstable();
         let at = |part: usize| {
-            differences
-                .get(differences.len() * part / 100)
-                .copied()
-                .unwrap_or(0)
+            let place = differences.len() * part / 100;
+            differences.get(place).copied().unwrap_or(0)
         };
         println!(
             "{name}: lightmaps differ by {}/255 in the median from those that it had, 90 % by at most {}",

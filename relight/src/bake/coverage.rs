@@ -51,13 +51,11 @@ impl PageTriangle {
     /// The texels that it may touch in a page: first and one past the last.
     pub fn bounds(&self, side: usize) -> (IVec2, IVec2) {
         let [a, b, c] = self.corners();
-        let least = (a.min(b).min(c) - EDGE).floor().as_ivec2();
-        let most = (a.max(b).max(c) + EDGE).floor().as_ivec2() + 1;
-        let side = IVec2::splat((side as i32).min(MOST));
-        (
-            least.clamp(IVec2::ZERO, side),
-            most.clamp(IVec2::ZERO, side),
-        )
+        let side = Vec2::splat((side as i32).min(MOST) as f32);
+        let least = (a.min(b).min(c) - EDGE).floor();
+        let most = (a.max(b).max(c) + EDGE).floor() + 1.0;
+        let bound = |at: Vec2| at.clamp(Vec2::ZERO, side).as_ivec2();
+        (bound(least), bound(most))
     }
 
     /// Barycentric coordinates of the second and third corner at a place in texels, if the triangle covers it.

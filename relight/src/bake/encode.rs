@@ -1,5 +1,6 @@
 //! Light to the bytes that maps store.
 
+use super::page::light_bytes;
 use crate::emitters::raise;
 use crate::world::RelitWorld;
 use glam::Vec3;
@@ -38,11 +39,11 @@ impl Encoding {
         (self.full, self.gamma, self.exponent) = (OVERBRIGHT, gamma, 1.0);
     }
 
-    /// Bytes of light (irradiance over π). `scale`: factor of the material ([`WorldMaterial::stored_scale`]). A colour
-    /// with a channel above 255 is scaled down whole, so that its hue stays.
+    /// Stored value of light (irradiance over π), 1 for a byte of 255. `scale`: factor of the material
+    /// ([`WorldMaterial::stored_scale`]).
     ///
     /// [`WorldMaterial::stored_scale`]: crate::WorldMaterial::stored_scale
-    pub fn bytes(&self, light: Vec3, scale: f32) -> [u8; 3] {
+    pub fn stored(&self, light: Vec3, scale: f32) -> Vec3 {
         let light = match self.exponent == 1.0 {
             true => light.max(Vec3::ZERO),
             false => raise(light, self.exponent.recip()),
@@ -52,21 +53,12 @@ impl Encoding {
             true => part,
             false => part.powf(self.gamma.recip()),
         };
-        let value = encoded * (255.0 / self.compensate);
-        let most = value.max_element();
-        let bound = if most > 255.0 { 255.0 / most } else { 1.0 };
-        (value * bound)
-            .to_array()
-            .map(|channel| channel.round() as u8)
+        encoded / self.compensate
     }
 
-    /// Bytes of an image that is shown as it is, without overbright bits.
-    pub fn shown(&self, light: Vec3, scale: f32) -> [u8; 3] {
-        Encoding {
-            compensate: self.compensate / OVERBRIGHT,
-            ..*self
-        }
-        .bytes(light, scale)
+    /// Bytes of light. A colour with a channel above 255 is scaled down whole, so that its hue stays.
+    pub fn bytes(&self, light: Vec3, scale: f32) -> [u8; 3] {
+        light_bytes(self.stored(light, scale))
     }
 }
 
@@ -85,7 +77,6 @@ mod tests {
     fn bytes_are_in_proportion_to_light_and_keep_their_hue() {
         assert_eq!(PLAIN.bytes(Vec3::new(1.0, 0.5, 0.0), 1.0), [64, 32, 0]);
         assert_eq!(PLAIN.bytes(Vec3::new(8.0, 4.0, 2.0), 1.0), [255, 128, 64]);
-        assert_eq!(PLAIN.shown(Vec3::new(1.0, 0.5, 0.0), 1.0), [255, 128, 0]);
         assert_eq!(PLAIN.bytes(Vec3::new(f32::NAN, -1.0, 0.1), 1.0)[1], 0);
         let half = Encoding {
             compensate: 2.0,

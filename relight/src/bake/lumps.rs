@@ -1,48 +1,87 @@
 //! Baked light in a map's lumps.
 
+use super::page::Page;
+use super::store::deluxe::{DirectionSpace, direction_texel};
 use super::{Baked, BakedPage, Encoding};
 use crate::world::{RelitWorld, WorldSurface};
 use glam::{Vec2, Vec3};
-use q3bsp::{Bsp, SurfaceKind};
+use q3bsp::{Bsp, Lightmap, SurfaceKind};
 use std::collections::HashMap;
 use support::slice::item;
 
-/// What was changed in a map.
+/// What was changed in a map beside its pages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Stored {
-    /// Pages of lightmaps.
-    pub pages: usize,
-    /// Texels in them.
-    pub texels: usize,
     /// Vertices.
     pub vertices: usize,
     /// Points of the light grid.
     pub grid: usize,
-    /// Pages that the map's scripts name; they are images outside of the map and stay as they are.
-    pub outside: usize,
 }
 
 impl Baked {
-    /// Writes the light into a map: the one of the world, or one with the same surfaces, vertices and pages. Texels that no
-    /// surface shows, and everything that is no light, stay as they are.
-    pub fn store(&self, world: &RelitWorld, bsp: &mut Bsp, encoding: Encoding) -> Stored {
-        let mut stored = Stored::default();
-        let mut sources: HashMap<usize, &BakedPage> = HashMap::new();
-        for page in &self.pages {
-            sources.insert(page.number, page);
-            let Some(target) = bsp.lightmaps.get_mut(page.number) else {
-                stored.outside += 1;
+    /// Pages of stored light for a map, one for each that it has. Texels that no surface shows stay as they are.
+    pub fn pages(&self, world: &RelitWorld, bsp: &Bsp, encoding: Encoding) -> Vec<Page> {
+        let as_it_was = |page: &Lightmap| Page {
+            side: page.size(),
+            texels: (page.0.as_chunks::<3>().0.iter())
+                .map(|texel| Vec3::from_array(texel.map(f32::from)) / 255.0)
+                .collect(),
+        };
+        let mut pages: Vec<Page> = bsp.lightmaps.iter().map(as_it_was).collect();
+        for baked in &self.pages {
+            let Some(page) = pages.get_mut(baked.number) else {
                 continue;
             };
-            stored.pages += 1;
-            let texels = target.0.as_chunks_mut::<3>().0.iter_mut();
-            for ((texel, light), &owner) in texels.zip(&page.light).zip(&page.owners) {
+            let texels = page.texels.iter_mut();
+            for ((texel, light), &owner) in texels.zip(&baked.light).zip(&baked.owners) {
                 if owner != u32::MAX {
-                    *texel = encoding.bytes(light.value, scale_of(world, owner));
-                    stored.texels += 1;
+                    *texel = encoding.stored(light.value, scale_of(world, owner));
                 }
             }
         }
+        pages
+    }
+
+    /// Pages of directions to the light, for a map with these pages; see
+    /// [`store::deluxe`](super::store::deluxe).
+    pub fn directions(&self, world: &RelitWorld, bsp: &Bsp, space: DirectionSpace) -> Vec<Page> {
+        let blank = |page: &Lightmap| Page {
+            side: page.size(),
+            texels: vec![direction_texel(Vec3::ZERO, Vec3::Z, space); page.size() * page.size()],
+        };
+        let mut pages: Vec<Page> = bsp.lightmaps.iter().map(blank).collect();
+        for baked in &self.pages {
+            let Some(page) = pages.get_mut(baked.number) else {
+                continue;
+            };
+            let texels = page.texels.iter_mut();
+            for ((texel, light), &owner) in texels.zip(&baked.light).zip(&baked.owners) {
+                if let Some(surface) = world.surfaces.get(owner as usize) {
+                    let normal = surface.plane.map_or(light.towards, |plane| plane.normal);
+                    *texel = direction_texel(light.towards, normal.normalize_or(Vec3::Z), space);
+                }
+            }
+        }
+        pages
+    }
+
+    /// Number of pages that scripts name: images outside of the map, which [`pages`](Self::pages) does not have.
+    pub fn pages_outside(&self, bsp: &Bsp) -> usize {
+        let outside = |page: &&BakedPage| page.number >= bsp.lightmaps.len();
+        self.pages.iter().filter(outside).count()
+    }
+
+    /// Writes the light of vertices and of the grid into a map: the one of the world, or one with the same surfaces and
+    /// vertices. Everything that is no light stays as it is.
+    pub fn store_beside_pages(
+        &self,
+        world: &RelitWorld,
+        bsp: &mut Bsp,
+        encoding: Encoding,
+    ) -> Stored {
+        let mut stored = Stored::default();
+        let sources: HashMap<usize, &BakedPage> =
+            self.pages.iter().map(|page| (page.number, page)).collect();
         for &(vertex, surface, light) in &self.vertices {
             let bytes = encoding.bytes(light, scale_of(world, surface));
             stored.vertices += usize::from(set_color(bsp, vertex, bytes));

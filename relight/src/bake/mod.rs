@@ -31,9 +31,9 @@ mod tests;
 
 pub use encode::Encoding;
 pub use gather::{Gather, GatherError, GatherProgress, Light, LitSurfaces, LitTriangle, Point};
+pub use lumps::Stored;
 pub use page::{Page, light_bytes};
 pub use rays::Rays;
-pub use lumps::Stored;
 
 use crate::calibrate::Dirt;
 use crate::occluders::Occluders;

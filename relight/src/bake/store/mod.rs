@@ -32,12 +32,12 @@ pub enum StoreError {
         /// Texels per side in the format.
         wanted: usize,
     },
-    /// Not as many pages as the map's surfaces use.
-    #[error("{found} pages, and surfaces use {wanted}")]
+    /// Not as many pages as the map has.
+    #[error("{found} pages for a map of {wanted}")]
     Pages {
         /// Pages given.
         found: usize,
-        /// Pages that surfaces use.
+        /// Pages of the map.
         wanted: usize,
     },
     /// A path that engines cut off: they keep 63 bytes.
@@ -51,11 +51,9 @@ pub(super) fn lightmap(page: &Page) -> Lightmap {
     Lightmap(bytes.collect())
 }
 
-/// Checks that surfaces find their pages and that all pages have one size.
+/// Checks that surfaces find the pages that they found in the map, and that all pages have one size.
 fn check(bsp: &Bsp, pages: &[Page]) -> Result<(), StoreError> {
-    let numbers = bsp.surfaces.iter().map(|s| s.lightmap);
-    let most = numbers.max().unwrap_or(-1);
-    let wanted = usize::try_from(most.saturating_add(1)).unwrap_or(0);
+    let wanted = bsp.lightmaps.len();
     if wanted > pages.len() {
         let found = pages.len();
         return Err(StoreError::Pages { found, wanted });
