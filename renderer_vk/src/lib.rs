@@ -8,6 +8,9 @@ mod assets;
 #[cfg(test)]
 mod assets_tests;
 mod at_once;
+mod bake;
+#[cfg(test)]
+mod bake_tests;
 mod error;
 mod frame;
 mod gpu;
@@ -29,6 +32,7 @@ mod trace;
 mod world;
 
 pub use assets::LoadedFont;
+pub use bake::{GatherOptions, GpuGather};
 pub use error::Error;
 pub use gpu::{
     CreateSurface, DeviceInfo, DeviceKind, Error as GpuError, RayTracingLimits, Window,

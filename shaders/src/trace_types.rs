@@ -3,6 +3,7 @@
 //! is display white. Positions and directions are in world space unless stated otherwise. Addresses are buffer device
 //! addresses.
 
+mod bake;
 pub mod constants;
 mod feedback;
 mod frames;
@@ -17,6 +18,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::types::MaterialBuffers;
 
+pub use bake::{BakeLight, BakePoint, BakePointLight, BakeStep, BakeTriangle, BakeView};
 pub use feedback::FeedbackView;
 pub use frames::{AntialiasView, DenoiseView, LastInstance, MotionView, ScreenView};
 pub use lights::{

@@ -75,14 +75,6 @@ float specular_random(LightTask task, uint path) {
     return rng_independent();
 }
 
-// A cosine-weighted direction about n. With this density the estimator of L is the radiance along the ray.
-vec3 sample_cosine(vec3 n, vec2 u) {
-    vec3 t, b;
-    basis(n, t, b);
-    float r = sqrt(u.x), phi = 2.0 * PI * u.y;
-    return normalize(t * (r * cos(phi)) + b * (r * sin(phi)) + n * sqrt(max(1.0 - u.x, 0.0)));
-}
-
 // Samples the direction of the next ray. False: it points into the surface, which an interpolated normal permits; no
 // light comes from there.
 bool bounce_direction(PathVertex v, out vec3 direction) {

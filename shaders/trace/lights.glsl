@@ -162,6 +162,14 @@ vec3 sample_cone(vec3 axis, float cos_angle, vec2 u) {
     return t * (r * cos(phi)) + b * (r * sin(phi)) + axis * z;
 }
 
+// A cosine-weighted direction about n. With this density the estimator of L is the radiance along the ray.
+vec3 sample_cosine(vec3 n, vec2 u) {
+    vec3 t, b;
+    basis(n, t, b);
+    float r = sqrt(u.x), phi = 2.0 * PI * u.y;
+    return normalize(t * (r * cos(phi)) + b * (r * sin(phi)) + n * sqrt(max(1.0 - u.x, 0.0)));
+}
+
 // Part of a sphere light's radiance towards a point in `direction` from it.
 float spot_factor(SphereLight light, vec3 direction) {
     if (light.cos_outer <= -2.0) return 1.0;

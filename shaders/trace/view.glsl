@@ -37,6 +37,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Dyn
 layout(push_constant, scalar) uniform Push { FilterStep push; };
 #elif defined(HYBRID_STEP)
 layout(push_constant, scalar) uniform Push { HybridStep push; };
+#elif defined(BAKE_STEP)
+layout(push_constant, scalar) uniform Push { BakeStep push; };
 #elif defined(FIRST_HITS_STEP)
 layout(push_constant, scalar) uniform Push { FirstHitsStep push; };
 #else

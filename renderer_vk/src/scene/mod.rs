@@ -39,9 +39,7 @@ use crate::stereo::Eye;
 use crate::world::{VisibleSet, World, WorldData};
 pub use debug_polygons::DebugPolygons;
 pub use flares::ViewFlare;
-#[cfg(test)]
-pub use look::TracedPart;
-pub use look::{ClassicPart, ClassicScene, LookPart, LookPartMut, TracedScene};
+pub use look::{ClassicPart, ClassicScene, LookPart, LookPartMut, TracedPart, TracedScene};
 pub use rigid::{MeshId, RigidMesh, Shape, finite_bounds};
 pub use shadow_volumes::ShadowVolumes;
 pub(crate) use shapes::perpendicular;

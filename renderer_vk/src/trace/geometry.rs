@@ -120,6 +120,8 @@ pub struct StaticGeometry {
     pub cost: StructureCost,
     /// Numbers of the first triangles: those of the world that stop rays, but for the sky; all of the world.
     pub world_triangles: [u32; 2],
+    /// For each of all triangles, its number in the scene's indices.
+    pub sources: Vec<u32>,
     /// Records of the structures' triangles, which shaders read by address.
     triangle_records: Buffer,
 }
@@ -168,6 +170,8 @@ pub fn sides(kind: Kind) -> u32 {
 /// CPU data: triangles grouped by model and kind, translucent ones in drawing order, with their indices.
 struct Grouped {
     triangles: Vec<Triangle>,
+    /// The number of each in the scene's indices.
+    sources: Vec<u32>,
     groups: BTreeMap<(u32, Kind), Group>,
     skies: Vec<SkyRecord>,
 }
@@ -232,6 +236,7 @@ fn group(
     let sorted = members(scene, materials, &doubled);
     let mut grouped = Grouped {
         triangles: Vec::new(),
+        sources: Vec::new(),
         groups: BTreeMap::new(),
         skies: Vec::new(),
     };
@@ -281,6 +286,7 @@ fn group(
                 if bodies.contains(&surface.number) {
                     shape |= TRIANGLE_BODY;
                 }
+                (grouped.sources).push(u32::try_from(first / 3).unwrap_or(u32::MAX));
                 grouped.triangles.push(Triangle {
                     indices,
                     material,
@@ -398,6 +404,7 @@ impl StaticGeometry {
             bodies: Bodies::new(device, scene, materials, &bodies)?,
             world_triangles: grouped.world_triangles(),
             surroundings: Surroundings::default(),
+            sources: grouped.sources,
             triangle_records: triangles,
         })
     }

@@ -203,7 +203,7 @@ pub(super) fn triangle_bounds(light: &t::TriangleLight) -> t::LightBounds {
 
 /// For each light, the irradiance over pi below which its contribution is 0. The map compiler made one light per
 /// triangle; of a sprite it made one light in all, so that each quad's cutoff is its share. Skies have no cutoff.
-fn ends(source: &MapLightSource<'_>) -> Vec<f32> {
+pub(super) fn ends(source: &MapLightSource<'_>) -> Vec<f32> {
     if source.light_cutoff <= 0.0 {
         return vec![0.0; source.triangles.len()];
     }
@@ -264,6 +264,14 @@ pub(super) fn point_light(light: &PointLight, end: f32) -> t::SphereLight {
         (s.cos_inner, s.cos_outer) = spot_cosines(spot.tan_half_angle);
     }
     s
+}
+
+pub(super) fn sun_light(sun: &SunLight) -> t::SunLight {
+    t::SunLight {
+        direction: sun.direction.normalize_or(Vec3::Z),
+        cos_angle: sun.angular_radius.clamp(0.0, 1.5).cos(),
+        irradiance: sun.irradiance / PI,
+    }
 }
 
 /// The point lights with those that pulse put out, so that indices stay.
@@ -352,14 +360,14 @@ impl SortedTriangles {
 }
 
 /// Buffers that shaders read by address.
-struct Buffers<'a> {
-    device: &'a Device,
-    made: Vec<Buffer>,
+pub(super) struct Buffers<'a> {
+    pub device: &'a Device,
+    pub made: Vec<Buffer>,
 }
 
 impl Buffers<'_> {
     /// Uploads data; returns its address.
-    fn add<T: bytemuck::Pod>(&mut self, name: &str, data: &[T]) -> Result<u64, Error> {
+    pub fn add<T: bytemuck::Pod>(&mut self, name: &str, data: &[T]) -> Result<u64, Error> {
         let buffer = Buffer::with_data(self.device, name, BufferUsage::STORAGE, data)?;
         let address = buffer.address();
         self.made.push(buffer);
@@ -377,15 +385,7 @@ impl MapLights {
         let spheres: Vec<t::SphereLight> = (source.points.iter())
             .map(|light| point_light(light, source.light_cutoff))
             .collect();
-        let suns: Vec<t::SunLight> = source
-            .suns
-            .iter()
-            .map(|sun| t::SunLight {
-                direction: sun.direction.normalize_or(Vec3::Z),
-                cos_angle: sun.angular_radius.clamp(0.0, 1.5).cos(),
-                irradiance: sun.irradiance / PI,
-            })
-            .collect();
+        let suns: Vec<t::SunLight> = source.suns.iter().map(sun_light).collect();
         let emitted = emitted(source);
         let lists = source.lists;
         let length = |cluster| i32::try_from(cluster).map_or(0, |c| lists.row(c).len());

@@ -11,6 +11,8 @@
 pub mod accel;
 pub mod ahead;
 pub mod antialias;
+pub mod bake;
+mod bake_lights;
 pub mod beyond_sky;
 pub mod bloom;
 mod blue_noise;

@@ -2,6 +2,8 @@
 
 use std::sync::OnceLock;
 
+use shaders::{RayShader, Spirv};
+
 use super::passes::{Pass, Shader, TABLE};
 use super::tracer::Tracer;
 use crate::at_once::{Late, Make, make_all};
@@ -13,6 +15,52 @@ pub enum Pipeline {
     Rays(RayTracingPipeline),
     /// A compute shader, which may trace rays itself.
     Compute(ComputePipeline),
+}
+
+impl Pipeline {
+    /// The variant of a ray generation shader for a tracer.
+    ///
+    /// # Errors
+    /// The driver refuses the pipeline.
+    pub fn of_rays(
+        device: &Device,
+        tracer: Tracer,
+        name: &str,
+        rays: &RayShader,
+        constants: &[(u32, u32)],
+    ) -> Result<Self, Error> {
+        match tracer {
+            Tracer::Compute => compute(device, name, rays.compute, constants),
+            Tracer::Grid => compute(device, name, rays.grid, constants),
+            Tracer::Query => compute(device, name, rays.query, constants),
+            Tracer::Pipeline => {
+                let any_hit = |any_hit| HitGroup {
+                    closest_hit: Some(&shaders::TRACE_HIT_RCHIT),
+                    any_hit: Some(any_hit),
+                };
+                let desc = RayTracingDesc {
+                    name,
+                    raygen: rays.pipeline,
+                    miss: &[&shaders::TRACE_MISS_RMISS, &shaders::TRACE_LAYERS_RMISS],
+                    hit: &[
+                        any_hit(&shaders::TRACE_TESTED_RAHIT),
+                        any_hit(&shaders::TRACE_TRANSLUCENT_RAHIT),
+                    ],
+                    constants,
+                };
+                RayTracingPipeline::new(device, &desc).map(Self::Rays)
+            }
+        }
+    }
+}
+
+fn compute(
+    device: &Device,
+    name: &str,
+    spirv: &'static Spirv,
+    constants: &[(u32, u32)],
+) -> Result<Pipeline, Error> {
+    ComputePipeline::new(device, name, spirv, constants).map(Pipeline::Compute)
 }
 
 /// Pipelines of each pass, by the state of its switches: one bit each.
@@ -74,31 +122,10 @@ impl PassSet {
         let mut constants = row.constants.to_vec();
         let switches = row.switches.iter().zip(0..);
         constants.extend(switches.map(|((id, _), bit)| (*id, u32::from(on >> bit & 1 != 0))));
-        let compute = |spirv| {
-            let made = ComputePipeline::new(&self.device, row.name, spirv, &constants);
-            made.map(Pipeline::Compute)
-        };
-        match (row.shader, self.tracer) {
-            (Shader::Compute(spirv), _) => compute(spirv),
-            (Shader::Rays(rays), Tracer::Compute) => compute(rays.compute),
-            (Shader::Rays(rays), Tracer::Grid) => compute(rays.grid),
-            (Shader::Rays(rays), Tracer::Query) => compute(rays.query),
-            (Shader::Rays(rays), Tracer::Pipeline) => {
-                let any_hit = |any_hit| HitGroup {
-                    closest_hit: Some(&shaders::TRACE_HIT_RCHIT),
-                    any_hit: Some(any_hit),
-                };
-                let desc = RayTracingDesc {
-                    name: row.name,
-                    raygen: rays.pipeline,
-                    miss: &[&shaders::TRACE_MISS_RMISS, &shaders::TRACE_LAYERS_RMISS],
-                    hit: &[
-                        any_hit(&shaders::TRACE_TESTED_RAHIT),
-                        any_hit(&shaders::TRACE_TRANSLUCENT_RAHIT),
-                    ],
-                    constants: &constants,
-                };
-                RayTracingPipeline::new(&self.device, &desc).map(Pipeline::Rays)
+        match row.shader {
+            Shader::Compute(spirv) => compute(&self.device, row.name, spirv, &constants),
+            Shader::Rays(rays) => {
+                Pipeline::of_rays(&self.device, self.tracer, row.name, rays, &constants)
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Converts a relit map to drawable data: finds materials, makes lightmaps, and adds the levels of detail of curves.
 
 use glam::Vec3;
-use q3bsp::{SurfaceKind, lightmap_index};
+use q3bsp::{PatchMesh, SurfaceKind, lightmap_index};
 use relight::RelitWorld;
 use relight::image::Image;
 use shaders::types::{
@@ -111,8 +111,16 @@ impl WorldData {
             .map(|fog| materials.find(source, &fog.volume.shader, LightmapClass::None, true))
             .collect();
         let mut indices = relit.indices.clone();
-        let mut surfaces =
-            find_surfaces(&relit, &lightmaps, &mut indices, materials, source, options);
+        let patches = relit.bsp.patch_meshes(options.subdivisions);
+        let mut surfaces = find_surfaces(
+            &relit,
+            &lightmaps,
+            &patches,
+            &mut indices,
+            materials,
+            source,
+            options,
+        );
         let mut vertices: Vec<Vertex> = relit.vertices.iter().map(|v| vertex(v, options)).collect();
         for (index, surface) in surfaces.iter_mut().enumerate() {
             if materials.get(surface.material).uses_normals() {
@@ -154,16 +162,42 @@ impl WorldData {
     }
 }
 
+/// Geometry of a relit map that stops light, without lightmaps and levels of detail.
+pub struct Occluding {
+    /// Vertices of the relit map.
+    pub vertices: Vec<Vertex>,
+    /// The map's surfaces, with their materials.
+    pub surfaces: Vec<WorldSurface>,
+}
+
+impl Occluding {
+    /// Finds the materials of a map.
+    pub fn new<S: LightmapSink>(
+        relit: &RelitWorld,
+        materials: &mut Materials,
+        source: &mut S,
+        options: &WorldOptions,
+    ) -> Self {
+        let mut none = Vec::new();
+        let surfaces = find_surfaces(relit, &[], &[], &mut none, materials, source, options);
+        remap_by_map(relit, materials, source, options);
+        Self {
+            vertices: relit.vertices.iter().map(|v| vertex(v, options)).collect(),
+            surfaces,
+        }
+    }
+}
+
 /// The surfaces with materials, lightmaps and levels of detail. Appends the indices of coarser levels.
 fn find_surfaces<S: LightmapSink>(
     relit: &RelitWorld,
     lightmaps: &[u32],
+    patches: &[Option<PatchMesh>],
     indices: &mut Vec<u32>,
     materials: &mut Materials,
     source: &mut S,
     options: &WorldOptions,
 ) -> Vec<WorldSurface> {
-    let patches = relit.bsp.patch_meshes(options.subdivisions);
     let mut surfaces = Vec::with_capacity(relit.surfaces.len());
     for (index, stored) in relit.surfaces.iter().enumerate() {
         let material = relit.materials.get(stored.material as usize);

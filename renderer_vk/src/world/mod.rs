@@ -21,7 +21,7 @@ use crate::gpu::{self, Buffer, BufferUsage, Device};
 use crate::settings::{MapLightChoice, Settings};
 
 pub use grid::GridLight;
-pub use load::{LightmapSink, WorldOptions};
+pub use load::{LightmapSink, Occluding, WorldOptions};
 pub use marks::{Marked, Marker};
 pub use patch_lod::PatchLod;
 pub use tokens::EntityTokens;

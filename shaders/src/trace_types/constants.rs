@@ -259,6 +259,13 @@ pub const STREAM_REUSE: u32 = 4002;
 
 /// Light at vertices, by vertex or triangle instead of by pixel.
 pub const STREAM_VERTICES: u32 = 4003;
+/// Light of a bake, by point and light instead of by pixel.
+pub const STREAM_BAKE: u32 = 4004;
+
+/// `BakeTriangle::kind`: the triangle reflects nothing; its light is at texels, or at its corners.
+pub const BAKE_DARK: u32 = 0;
+pub const BAKE_TEXELS: u32 = 1;
+pub const BAKE_VERTICES: u32 = 2;
 
 /// `PassStep::part` of a bounce: bit of the paths that start at rough surfaces; number of the first bit of the path's
 /// number; below it the pixel of the cell.

@@ -4,6 +4,7 @@
 mod ambient;
 mod antialias_variants;
 mod antialiasing;
+mod baking;
 mod blooming;
 mod bounces;
 mod caustics;

@@ -389,6 +389,34 @@ impl Scene {
         }
     }
 
+    /// The lists of the tree; without one, of all lights.
+    pub fn lists(&self) -> LightLists {
+        if let Some((_, lists)) = &self.tree {
+            return lists.clone();
+        }
+        let all: Vec<u32> = (0..(self.lights.len() + self.points.len()) as u32).collect();
+        LightLists {
+            offsets: vec![0, all.len() as u32],
+            lights: all,
+            triangle_lights: self.lights.len() as u32,
+            sky: Vec::new(),
+            shares: Vec::new(),
+        }
+    }
+
+    /// The lights, none of which rays can hit.
+    pub fn light_source<'a>(&'a self, lists: &'a LightLists) -> MapLightSource<'a> {
+        MapLightSource {
+            triangles: &self.lights,
+            points: &self.points,
+            suns: &self.suns,
+            ambient: self.ambient,
+            light_cutoff: self.light_cutoff,
+            bsp: self.tree.as_ref().map(|t| &t.0),
+            ..MapLightSource::empty(lists)
+        }
+    }
+
     pub fn upload(&self, device: &Device, tracer: Tracer) -> Uploaded {
         let storage = BufferUsage::STORAGE;
         let materials: Vec<Material> = self.materials.iter().map(|m| m.0).collect();
@@ -407,26 +435,10 @@ impl Scene {
             coverages: self.coverages.clone(),
             buffers,
         };
-        let all: Vec<u32> = (0..(self.lights.len() + self.points.len()) as u32).collect();
-        let lists = LightLists {
-            offsets: vec![0, all.len() as u32],
-            lights: all,
-            triangle_lights: self.lights.len() as u32,
-            sky: Vec::new(),
-            shares: Vec::new(),
-        };
+        let lists = self.lists();
         let source = MapLightSource {
-            triangles: &self.lights,
-            points: &self.points,
-            suns: &self.suns,
-            lists: self.tree.as_ref().map_or(&lists, |t| &t.1),
-            flickers: &[],
             hittable: &vec![self.lights_are_hittable; self.lights.len()],
-            model_origins: &[],
-            ambient: self.ambient,
-            light_cutoff: self.light_cutoff,
-            bsp: self.tree.as_ref().map(|t| &t.0),
-            occlusion: None,
+            ..self.light_source(&lists)
         };
         let scene = StaticScene {
             vertices: &self.vertices,

@@ -1,0 +1,150 @@
+//! Light at points of a real map: all tracers and the CPU's rays agree.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use relight::bake::{Gather, Light, LitSurfaces, LitTriangle, Point, Rays};
+use relight::{GameFiles, Options, RelitWorld};
+
+use crate::bake::{GatherOptions, GpuGather};
+use crate::settings::TracerChoice;
+use crate::test_support::openarena;
+
+/// A map as its directives light it.
+fn load(files: &dyn GameFiles, map: &str) -> RelitWorld {
+    let scripts = relight::Materials::load(files).0;
+    let options = Options {
+        calibrate: None,
+        by_hand: false,
+        ..Options::default()
+    };
+    RelitWorld::load(files, &scripts, map, options).expect("map")
+}
+
+/// Points one unit above the middle of each of about `count` triangles of the world that stop light; every eighth has no
+/// surface.
+fn points(world: &RelitWorld, count: usize) -> Vec<Point> {
+    let of_world = world.surfaces.iter().filter(|s| s.model == 0);
+    let opaque = of_world.filter(|s| {
+        let material = world.material_of(s);
+        material.is_some_and(|m| {
+            !m.is_sky() && m.class.class == relight::materials::light::SurfaceClass::Opaque
+        })
+    });
+    let all: Vec<usize> = opaque.flat_map(|s| s.triangles()).collect();
+    let step = (all.len() / count).max(1);
+    let chosen = all.iter().step_by(step).enumerate();
+    chosen
+        .filter_map(|(number, &triangle)| {
+            let [a, b, c] = world.triangle(triangle);
+            let normal = (c - a).cross(b - a).try_normalize()?;
+            let position = (a + b + c) / 3.0 + normal;
+            // points in solid leafs have the list of all lights
+            let is_open = world.bsp.cluster_at(position) >= 0;
+            is_open.then_some(Point {
+                position,
+                normal: if number % 8 == 7 { Vec3::ZERO } else { normal },
+            })
+        })
+        .collect()
+}
+
+/// The median, and the 90th of 100 parts, of relative differences of green where one is above a hundredth of the mean; and
+/// the difference of the means.
+fn differences(found: &[Light], exact: &[Light]) -> [f32; 3] {
+    let mean = |lights: &[Light]| {
+        lights
+            .iter()
+            .map(|light| f64::from(light.value.y))
+            .sum::<f64>() as f32
+            / lights.len() as f32
+    };
+    let least = 0.01 * mean(exact);
+    let mut differences: Vec<f32> = (found.iter().zip(exact))
+        .map(|(found, exact)| (found.value.y, exact.value.y))
+        .filter(|(found, exact)| found.max(*exact) > least)
+        .map(|(found, exact)| (found - exact).abs() / found.max(exact))
+        .collect();
+    assert!(differences.len() > 100, "{} lit points", differences.len());
+    differences.sort_by(f32::total_cmp);
+    let at = |part: f32| differences[(differences.len() as f32 * part) as usize];
+    [at(0.5), at(0.9), mean(found) / mean(exact) - 1.0]
+}
+
+#[test]
+fn the_gpu_finds_the_light_that_the_cpu_finds() {
+    let Some(files) = openarena() else {
+        return;
+    };
+    let files: Arc<dyn GameFiles> = Arc::new(files);
+    let tracers = [
+        TracerChoice::Compute,
+        TracerChoice::Pipeline,
+        TracerChoice::Query,
+        TracerChoice::Grid,
+    ];
+    let full = testkit::is_set("RELIGHT_FULL");
+    let tracers = if full { &tracers[..] } else { &tracers[..2] };
+    // am_galmevish: points on lamps, closer to them than a lamp is wide, where the CPU takes the visible part of the area, and
+    // a sun through hellfog, which filters light here
+    for (map, tracers, bounds) in [
+        ("maps/kaos2.bsp", tracers, [0.003, 0.04, 0.01]),
+        ("maps/am_galmevish.bsp", &tracers[..1], [0.02, 0.5, 0.03]),
+    ] {
+        let world = load(&*files, map);
+        let points = points(&world, 400);
+        let count = world.indices.len() / 3;
+        let triangles = vec![LitTriangle::Vertices([0; 3]); count];
+        let reflectances = vec![Vec3::new(0.25, 0.5, 0.75); count];
+        let lit = LitSurfaces {
+            triangles: &triangles,
+            reflectances: &reflectances,
+            light: &[Vec3::ONE],
+        };
+        let mut cpu = Rays::new(&world);
+        let nothing = &mut |_| {};
+        let exact = [0, 32].map(|samples| cpu.direct(&points, samples, nothing).expect("light"));
+        let bounced = cpu.reflected(&points, lit, 256, nothing).expect("light");
+        println!(
+            "{map}: {} points, {} triangle lights, {} points, {} suns",
+            points.len(),
+            world.lights.len(),
+            world.point_lights.len(),
+            world.suns.len()
+        );
+        let mut first: Option<[Vec<Light>; 3]> = None;
+        for &tracer in tracers {
+            let options = GatherOptions {
+                tracer,
+                validation: true,
+                ..GatherOptions::default()
+            };
+            let made = GpuGather::new(&options, Arc::clone(&files), &world);
+            let Some(mut gpu) = testkit::device(made.map_err(|e| e.to_string())) else {
+                return;
+            };
+            let direct =
+                [0, 32].map(|samples| gpu.direct(&points, samples, nothing).expect("light"));
+            for (samples, (found, exact)) in [0, 32].iter().zip(direct.iter().zip(&exact)) {
+                let [median, most, mean] = differences(found, exact);
+                println!("{tracer:?} {samples} samples: median {median}, 90 % {most}, mean {mean}");
+                assert!(median < bounds[0] && most < bounds[1], "{median} {most}");
+                assert!(mean.abs() < bounds[2], "{mean}");
+            }
+            let reflected = gpu.reflected(&points, lit, 256, nothing).expect("light");
+            let [median, most, mean] = differences(&reflected, &bounced);
+            println!("{tracer:?} reflected: median {median}, 90 % {most}, mean {mean}");
+            assert!(median < 0.03 && most < 0.1 && mean.abs() < 0.01);
+            let messages = gpu.validation_messages();
+            assert!(messages.is_empty(), "{messages:#?}");
+            let [few, some] = direct;
+            let all = [few, some, reflected];
+            let same = first.get_or_insert_with(|| all.clone());
+            for (found, exact) in all.iter().zip(same) {
+                let [median, most, mean] = differences(found, exact);
+                println!("{tracer:?} and the first: median {median}, 90 % {most}, mean {mean}");
+                assert!(median < 1e-4 && most < 0.01 && mean.abs() < 2e-3);
+            }
+        }
+    }
+}
