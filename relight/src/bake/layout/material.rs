@@ -1,7 +1,7 @@
 //! What a material's directives say about lightmaps.
 
 use crate::materials::Materials;
-use crate::materials::light::baked_light;
+use crate::materials::light::{BakedLight, baked_light};
 use shaderscript::{Shader, StageImage};
 
 /// What [`make`](super::make) needs to know of a material.
@@ -9,6 +9,8 @@ use shaderscript::{Shader, StageImage};
 pub struct LightmapUse {
     /// Whether the material shows the page that the map assigns to a surface.
     pub shows_page: bool,
+    /// Whether it shows light of further styles, at places of the present pages that its script names.
+    pub styled: bool,
     /// `q3map_lightmapSampleSize`: distance between texels, id units.
     pub sample_size: Option<f32>,
 }
@@ -18,6 +20,7 @@ impl Default for LightmapUse {
     fn default() -> LightmapUse {
         LightmapUse {
             shows_page: true,
+            styled: false,
             sample_size: None,
         }
     }
@@ -32,7 +35,9 @@ impl LightmapUse {
 
     /// Of a script. A rejected one is drawn with the default material, which shows the page.
     pub fn of_script(script: &Shader) -> LightmapUse {
-        let mut shown = script.stages.iter().zip(baked_light(&script.stages));
+        let light = baked_light(&script.stages);
+        let styled = light.contains(&Some(BakedLight::Style));
+        let mut shown = script.stages.iter().zip(light);
         let own = |stage: &shaderscript::Stage| stage.image == StageImage::Lightmap;
         let shows_page = shown.any(|(stage, light)| light.is_some() && own(stage));
         let vertex_lit = |name: &String| name == "pointlight" || name == "nolightmap";
@@ -47,6 +52,7 @@ impl LightmapUse {
         LightmapUse {
             shows_page: (shows_page || script.rejected.is_some())
                 && !script.surface_params.iter().any(vertex_lit),
+            styled,
             sample_size: size.filter(|size| *size > 0.0),
         }
     }
@@ -70,6 +76,9 @@ mod tests {
         assert!(!of(&format!("surfaceparm pointlight\n{lit}")).shows_page);
         assert!(!of("{\nmap a\nrgbGen vertex\n}").shows_page);
         assert!(!of("{\nmap maps/m/lm_0000.tga\ntcGen lightmap\n}").shows_page);
+        let pulse = "rgbGen wave sin 0.5 0.5 0 1\ntcMod transform 1 0 0 1 0.5 0";
+        let style = format!("{lit}\n{{\nmap $lightmap\nblendFunc add\n{pulse}\n}}");
+        assert!(of(&style).styled && of(&style).shows_page);
         let fine = of(&format!("q3map_lightmapSampleSize 4\n{lit}"));
         assert_eq!(fine.sample_size, Some(4.0));
     }

@@ -84,6 +84,9 @@ pub struct LayoutReport {
     pub texels: u64,
     /// Charts that are coarser than wanted.
     pub coarser: Vec<Coarser>,
+    /// Surfaces in charts whose materials also show light of further styles, at places of the former pages: that light is
+    /// lost, and [`store::external::scripted`](super::store::external::scripted) removes its stages.
+    pub styled: Vec<u32>,
     /// Surfaces that should have a lightmap and stay lit by vertex, because they cannot be laid flat.
     pub without: Vec<u32>,
     /// Vertices that were copied because surfaces shared them.
@@ -157,6 +160,7 @@ pub fn make(bsp: &mut Bsp, options: &LayoutOptions<'_>) -> Result<LayoutReport, 
         surfaces: plan.charts.iter().map(|chart| chart.parts.len()).sum(),
         texels: plan.charts.iter().map(area).sum(),
         coarser: plan.charts.iter().filter_map(coarser).collect(),
+        styled: styled(bsp, options),
         without: plan.without,
         copied_vertices,
         owners,
@@ -171,6 +175,19 @@ fn coarser(chart: &Chart) -> Option<Coarser> {
         wanted,
         used,
     })
+}
+
+/// The surfaces with a page whose materials show styles.
+fn styled(bsp: &Bsp, options: &LayoutOptions<'_>) -> Vec<u32> {
+    let shaders: Vec<bool> = (bsp.shaders.iter())
+        .map(|shader| (options.material)(&shader.name).styled)
+        .collect();
+    let is_styled = |s: &Surface| shaders.get(s.shader.index()).copied().unwrap_or(false);
+    (0u32..)
+        .zip(&bsp.surfaces)
+        .filter(|(_, surface)| surface.lightmap >= 0 && is_styled(surface))
+        .map(|(number, _)| number)
+        .collect()
 }
 
 /// Charts and their places.

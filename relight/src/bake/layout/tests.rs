@@ -138,7 +138,7 @@ fn only_surfaces_that_show_a_page_get_one() {
     let mut bsp = unlit(map);
     let material = |name: &str| LightmapUse {
         shows_page: name != "glow",
-        sample_size: None,
+        ..LightmapUse::default()
     };
     let report = make(&mut bsp, &LayoutOptions::internal(&material)).unwrap();
     let pages: Vec<i32> = bsp.surfaces.iter().map(|s| s.lightmap).collect();

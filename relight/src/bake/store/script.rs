@@ -2,6 +2,8 @@
 
 use crate::files::GameFiles;
 use crate::materials::Materials;
+use crate::materials::light::{BakedLight, baked_light};
+use shaderscript::Shader;
 use shaderscript::token::{Lexer, Reading, Token};
 
 /// The definition of a material without its name, with an image in place of `$lightmap`; of a material without script, what
@@ -15,7 +17,10 @@ pub(super) fn with_image(
     name: &str,
     image: &str,
 ) -> String {
-    let written = definition(files, materials, name).map(|tokens| replaced(&tokens, image));
+    let written = definition(files, materials, name).map(|(shader, tokens)| {
+        let light = baked_light(&shader.stages);
+        replaced(&tokens, &light, image)
+    });
     written.unwrap_or_else(|| {
         let name = shaderscript::strip_extension(name);
         format!(
@@ -26,7 +31,11 @@ pub(super) fn with_image(
 }
 
 /// The tokens of a definition from its opening brace to the closing one.
-fn definition(files: &dyn GameFiles, materials: &Materials, name: &str) -> Option<Vec<Token>> {
+fn definition<'a>(
+    files: &dyn GameFiles,
+    materials: &'a Materials,
+    name: &str,
+) -> Option<(&'a Shader, Vec<Token>)> {
     let shader = materials.library().find(name)?;
     let text = files.read(&shader.location.file).ok()??;
     let mut lexer = Lexer::new(&text, Reading::Compressed);
@@ -48,7 +57,7 @@ fn definition(files: &dyn GameFiles, materials: &Materials, name: &str) -> Optio
         }
         tokens.push(token);
         if depth == 0 {
-            return Some(tokens);
+            return Some((shader, tokens));
         }
     }
     None
@@ -57,8 +66,9 @@ fn definition(files: &dyn GameFiles, materials: &Materials, name: &str) -> Optio
 /// A line of a definition: how many braces are open, and its words.
 type Line = (usize, Vec<String>);
 
-/// The definition as text with the image in its stages of the lightmap.
-fn replaced(tokens: &[Token], image: &str) -> String {
+/// The definition as text with the image in its stages of the lightmap, and without those of styles, which show places of
+/// the former pages. `light`: baked light of each stage.
+fn replaced(tokens: &[Token], light: &[Option<BakedLight>], image: &str) -> String {
     let mut body = Vec::new();
     let mut stages: Vec<Vec<Line>> = Vec::new();
     let mut depth = 0usize;
@@ -89,21 +99,23 @@ fn replaced(tokens: &[Token], image: &str) -> String {
             }
         }
     }
+    let keep: Vec<bool> = (0..stages.len())
+        .map(|number| light.get(number) != Some(&Some(BakedLight::Style)))
+        .collect();
+    let mut kept = keep.iter();
+    stages.retain(|_| kept.next() == Some(&true));
     show_image(&mut stages, image);
     let mut text = "{\n".to_owned();
-    let mut stages = stages.into_iter();
-    for line in body {
-        match line.1.is_empty() {
-            true => {
-                text += "\t{\n";
-                stages
-                    .next()
-                    .iter()
-                    .flatten()
-                    .for_each(|line| write(&mut text, line));
-                text += "\t}\n";
+    let (mut stages, mut kept) = (stages.iter(), keep.iter());
+    for line in &body {
+        if !line.1.is_empty() {
+            write(&mut text, line);
+        } else if kept.next() == Some(&true) {
+            text += "\t{\n";
+            for line in stages.next().into_iter().flatten() {
+                write(&mut text, line);
             }
-            false => write(&mut text, &line),
+            text += "\t}\n";
         }
     }
     text + "}\n"
@@ -216,7 +228,6 @@ fn is_plain(stage: &[Line]) -> bool {
 mod tests {
     use super::*;
     use crate::files::MemoryFiles;
-    use crate::materials::light::{BakedLight, baked_light};
     use shaderscript::{StageImage, parse_script};
 
     fn written(script: &str, name: &str) -> String {
@@ -256,6 +267,20 @@ mod tests {
         assert!(
             text.contains("depthFunc equal\n\t\ttcGen lightmap\n\t\trgbGen identityLighting\n")
         );
+    }
+
+    #[test]
+    fn stages_of_styles_go() {
+        let script = "lamp\n{\n{\nmap $lightmap\n}\n{\nmap a.tga\nblendFunc filter\n}\n\
+            {\nmap $lightmap\nblendFunc GL_SRC_ALPHA GL_ONE\nrgbGen wave noise 0.5 1 0 5\n\
+            tcMod transform 1 0 0 1 0.5 0\n}\n{\nmap glow.tga\nblendFunc add\n}\n}\n";
+        let text = written(script, "lamp");
+        assert!(
+            !text.contains("noise") && text.contains("glow.tga"),
+            "{text}"
+        );
+        assert_eq!(text.matches("lm_0000").count(), 1);
+        assert_eq!(text.matches('{').count(), text.matches('}').count());
     }
 
     #[test]
