@@ -371,3 +371,46 @@ proptest! {
         Bsp::parse(&first.write()).unwrap();
     }
 }
+
+/// Bytes of each lump of a file.
+fn lumps(file: &[u8]) -> Vec<(q3bsp::Lump, Vec<u8>)> {
+    let entries = q3bsp::lump_entries(file).unwrap();
+    let bytes = |range: q3bsp::LumpRange| {
+        let start = range.offset as usize;
+        file[start..start + range.length as usize].to_vec()
+    };
+    entries
+        .into_iter()
+        .map(|entry| (entry.lump, bytes(entry.range)))
+        .collect()
+}
+
+#[test]
+fn installed_maps_are_laid_out_and_the_rest_of_them_stays() {
+    let Some(folder) = testkit::folder() else {
+        return;
+    };
+    let files = crate::files::SearchPath::open(&[folder]).unwrap();
+    let (materials, _) = Materials::load(&files);
+    let uses = |name: &str| LightmapUse::of(&materials, name);
+    use crate::files::GameFiles;
+    use q3bsp::Lump;
+    for map in ["oa_dm1", "kaos2", "oa_thor", "islandctf", "oa_minia"] {
+        let file = files.read(&format!("maps/{map}.bsp")).unwrap().unwrap();
+        let mut bsp = Bsp::parse(&file).unwrap();
+        let options = LayoutOptions {
+            finer: 2.0,
+            ..LayoutOptions::internal(&uses)
+        };
+        let report = make(&mut bsp, &options).unwrap();
+        check(&bsp, &report, 1);
+        assert!(report.efficiency() > 0.6, "{map}: {report:?}");
+        assert!(report.without.is_empty(), "{map}: {report:?}");
+        let written = bsp.write();
+        Bsp::parse(&written).unwrap();
+        for ((lump, before), (_, after)) in lumps(&file).into_iter().zip(lumps(&written)) {
+            let changes = matches!(lump, Lump::DrawVerts | Lump::Surfaces | Lump::Lightmaps);
+            assert_eq!(before != after, changes, "{map}: {lump}");
+        }
+    }
+}
