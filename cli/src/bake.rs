@@ -14,7 +14,7 @@ use relight::bake::store::external::{numbered, scripted};
 use relight::bake::store::pack::{RelitMap, relit_pack};
 use relight::bake::store::{self, GameFile};
 use relight::bake::{
-    BakeOptions, BakeStage, Baked, BakedPage, Gather, Page, Rays, Stored, bake, light_bytes, seams,
+    BakeOptions, BakeStage, Baked, BakedPage, Gather, Page, Stored, bake, light_bytes, seams,
 };
 use relight::export::Output;
 use relight::light::LightColor;
@@ -23,6 +23,7 @@ use relight::{
     external_lightmaps,
 };
 
+use crate::bake_device;
 use crate::game::Maps;
 use crate::numbers::positive;
 use crate::scripts::load_scripts;
@@ -76,6 +77,9 @@ pub struct BakeArgs {
     /// numbered
     #[arg(long, value_name = "KIND", num_args = 0..=1, default_missing_value = "scripted")]
     external: Option<External>,
+    /// What computes: cpu, gpu, or part of a Vulkan device's name; default: a GPU, else the CPU
+    #[arg(long, value_name = "NAME")]
+    device: Option<String>,
     /// Write pages of directions to the light between those of light, for engines with deluxe mapping
     #[arg(long)]
     deluxe: bool,
@@ -147,8 +151,8 @@ fn bake_map(args: &BakeArgs, map: &str, output: &Path) -> Result<()> {
     }
     let loaded = begin.elapsed();
     let options = options(args, &world);
-    let mut gather = Rays::new(&world);
-    let baked = bake_with_bar(&world, &mut gather, &options)?;
+    let mut gather = bake_device::gather(args.device.as_deref(), &source.files, &world)?;
+    let baked = bake_with_bar(&world, &mut *gather, &options)?;
     let encoding = options.encoding;
     let mut pages = baked.pages(&world, &changed, encoding);
     if laid_out {

@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 mod bake;
+mod bake_device;
 mod beside;
 mod brought;
 mod calibration;

@@ -18,7 +18,9 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::types::MaterialBuffers;
 
-pub use bake::{BakeLight, BakePoint, BakePointLight, BakeStep, BakeTriangle, BakeView};
+pub use bake::{
+    BakeEstimate, BakeLight, BakePoint, BakePointLight, BakeStep, BakeTriangle, BakeView,
+};
 pub use feedback::FeedbackView;
 pub use frames::{AntialiasView, DenoiseView, LastInstance, MotionView, ScreenView};
 pub use lights::{

@@ -2,13 +2,14 @@
 #ifndef RELIGHT_TRACE_BAKE_GLSL
 #define RELIGHT_TRACE_BAKE_GLSL
 
-#include "trace/shadows.glsl"
+#include "trace/lights.glsl"
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer BakeViews { BakeView bake; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer BakePoints { BakePoint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer BakePointLights { BakePointLight at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer BakeTriangles { BakeTriangle at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer BakeLights { BakeLight at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer BakeEstimates { BakeEstimate at[]; };
 
 #define BAKE (BakeViews(push.bake).bake)
 

@@ -23,7 +23,9 @@ use super::lights::{MapLightSource, count};
 use super::pass_set::Pipeline;
 use super::tracer::Tracer;
 use crate::api::RefDef;
-use crate::gpu::{Access, Buffer, BufferDesc, BufferUsage, Device, Error, FrameRing, Memory};
+use crate::gpu::{
+    Access, Buffer, BufferDesc, BufferUsage, ComputePipeline, Device, Error, FrameRing, Memory,
+};
 use crate::scene::{TracedPart, TracedScene, View};
 
 /// Most points of a chunk: 24 bytes of each up and 24 down, for two chunks at a time.
@@ -51,6 +53,7 @@ pub struct BakeScene<'a> {
 struct Chunk {
     points: Buffer,
     results: Buffer,
+    estimates: Buffer,
     read: Buffer,
 }
 
@@ -69,6 +72,11 @@ impl Chunk {
         Ok(Self {
             points: make("bake points", size_of::<t::BakePoint>(), Memory::Upload)?,
             results: make("bake results", light, Memory::Device)?,
+            estimates: make(
+                "bake estimates",
+                size_of::<t::BakeEstimate>(),
+                Memory::Device,
+            )?,
             read: make("bake read-back", light, Memory::Readback)?,
         })
     }
@@ -162,6 +170,8 @@ struct BakePass {
 /// What is computed at points.
 struct Work<'a> {
     pass: &'a BakePass,
+    /// Runs before the first slice of a chunk.
+    before: Option<&'a ComputePipeline>,
     view: t::BakeView,
     samples: u32,
     /// Lights of the longest list, or rays.
@@ -175,6 +185,7 @@ pub struct Baker {
     scene: TracedScene,
     lights: BakeLights,
     direct: Option<BakePass>,
+    estimate: Option<ComputePipeline>,
     reflected: Option<BakePass>,
     chunks: Option<[Chunk; 2]>,
     /// Bounds of chunks and slices, on which results do not depend.
@@ -234,6 +245,7 @@ impl Baker {
             },
             lights: BakeLights::new(device, lights, sky_light)?,
             direct: None,
+            estimate: None,
             reflected: None,
             chunks: None,
             limits: Limits {
@@ -260,8 +272,16 @@ impl Baker {
         let on = (&self.device, self.tracer);
         let shader = &shaders::TRACE_BAKE_DIRECT;
         let (view, all) = self.lights.view(scene.geometry, samples);
+        let estimate = match self.estimate.take() {
+            Some(made) => made,
+            None => {
+                let spirv = &shaders::TRACE_BAKE_ESTIMATE_COMP;
+                ComputePipeline::new(&self.device, "bake_estimate", spirv, &[])?
+            }
+        };
         let work = Work {
             pass: pass(on, &mut self.direct, "bake_direct", shader)?,
+            before: Some(self.estimate.insert(estimate)),
             view,
             samples,
             all,
@@ -296,6 +316,7 @@ impl Baker {
         let shader = &shaders::TRACE_BAKE_REFLECTED;
         let work = Work {
             pass: pass(on, &mut self.reflected, "bake_reflected", shader)?,
+            before: None,
             view: surfaces.view(scene.geometry),
             samples: rays.max(1),
             all: rays.max(1),
@@ -408,6 +429,7 @@ impl<'a> Run<'a> {
             let step = t::BakeStep {
                 points: chunk.points.address(),
                 results: chunk.results.address(),
+                estimates: chunk.estimates.address(),
                 count: count(points),
                 number: count(first),
                 first: from,
@@ -477,6 +499,12 @@ impl<'a> Run<'a> {
             bake: rec.arena().push(&[work.view])?,
             ..step
         };
+        if let Some(pipeline) = work.before.filter(|_| step.begins != 0) {
+            let mut pass = rec.pass("bake_estimate", Access::COMPUTE, Access::COMPUTE)?;
+            pass.bind_compute(pipeline);
+            pass.push(&step);
+            pass.dispatch_invocations(step.count, 1);
+        }
         match &work.pass.pipeline {
             Pipeline::Rays(pipeline) => {
                 let access = Access::RAY_TRACING;

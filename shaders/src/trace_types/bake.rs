@@ -23,6 +23,16 @@ pub struct BakeLight {
     pub towards: Vec3,
 }
 
+/// Unshadowed light of the list of a point, of the brightest channels.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct BakeEstimate {
+    /// Sum over the lights.
+    pub whole: f32,
+    /// Lights that give less than this are left out.
+    pub least: f32,
+}
+
 /// A point light with the falloff and the cone of the map compiler.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -111,6 +121,8 @@ pub struct BakeStep {
     pub points: u64,
     /// A [`BakeLight`] for each point, to which the pass adds.
     pub results: u64,
+    /// A [`BakeEstimate`] for each point.
+    pub estimates: u64,
     /// Number of points.
     pub count: u32,
     /// Number of the first point among all of the call: the key of its random numbers.
