@@ -14,11 +14,17 @@ const EDGE: f32 = 1.0e-3;
 /// Most texels that one triangle is searched for along an axis: coordinates of damaged maps.
 const MOST: i32 = 1 << 14;
 
+/// Least distance of a place from the border of its surface, id units: on the border it would lie in the plane of an adjacent
+/// wall, which then shadows nothing.
+pub const INSET: f32 = 0.5;
+
 /// A triangle in its page.
 #[derive(Debug, Clone, Copy)]
 pub struct PageTriangle {
     /// Its vertices.
     vertices: [WorldVertex; 3],
+    /// For the edge from each vertex to the next: unit vector into the triangle, if the surface ends there.
+    inward: [Option<Vec3>; 3],
     /// First corner, in texels.
     origin: Vec2,
     /// Edges from it, in texels.
@@ -29,13 +35,19 @@ pub struct PageTriangle {
 
 impl PageTriangle {
     /// A triangle in a page of so many texels a side; `None` if its coordinates are not finite or it has no area there.
-    pub fn new(vertices: [WorldVertex; 3], side: usize) -> Option<PageTriangle> {
+    /// `ends`: whether the surface ends at the edge from each vertex to the next.
+    pub fn new(vertices: [WorldVertex; 3], ends: [bool; 3], side: usize) -> Option<PageTriangle> {
+        let [p, q, r] = vertices.map(|v| v.position);
+        let normal = (q - p).cross(r - p);
+        let inward = [(p, q), (q, r), (r, p)].map(|(a, b)| normal.cross(b - a).normalize_or_zero());
+        let inward = [0, 1, 2].map(|k| ends[k].then_some(inward[k]));
         let [a, b, c] = vertices.map(|v| v.lightmap * side as f32);
         let edges = [b - a, c - a];
         let determinant = edges[0].perp_dot(edges[1]);
         let finite = a.is_finite() && b.is_finite() && c.is_finite();
         (finite && determinant.abs() > 1.0e-6).then_some(PageTriangle {
             vertices,
+            inward,
             origin: a,
             edges,
             determinant,
@@ -76,7 +88,24 @@ impl PageTriangle {
         let position =
             a.position + (b.position - a.position) * w.x + (c.position - a.position) * w.y;
         let normal = a.normal + (b.normal - a.normal) * w.x + (c.normal - a.normal) * w.y;
-        Some((position, normal.normalize_or(a.normal)))
+        Some((self.inset(position), normal.normalize_or(a.normal)))
+    }
+
+    /// A position moved away from the border of the surface.
+    fn inset(&self, mut position: Vec3) -> Vec3 {
+        for (vertex, inward) in self.vertices.iter().zip(self.inward) {
+            if let Some(inward) = inward {
+                let distance = (position - vertex.position).dot(inward);
+                position += inward * (INSET - distance).max(0.0);
+            }
+        }
+        position
+    }
+
+    /// Its middle.
+    pub fn middle(&self) -> Vec3 {
+        let [a, b, c] = self.vertices.map(|v| v.position);
+        (a + b + c) / 3.0
     }
 }
 
@@ -91,6 +120,8 @@ pub struct Place {
     pub position: Vec3,
     /// Unit normal.
     pub normal: Vec3,
+    /// Middle of the triangle that it is on.
+    pub middle: Vec3,
 }
 
 /// Finds the places in a page's texels, a pattern of `pattern` × `pattern` places each: of a texel that a triangle touches
@@ -128,6 +159,7 @@ pub fn places(side: usize, pattern: u32, triangles: &[(u32, PageTriangle)]) -> V
                             surface: *surface,
                             position,
                             normal,
+                            middle: triangle.middle(),
                         });
                         if alone {
                             break;
@@ -227,7 +259,7 @@ mod tests {
 
     fn square(x0: f32, y0: f32, x1: f32, y1: f32) -> [(u32, PageTriangle); 2] {
         let [a, b, c, d] = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)].map(|(x, y)| vertex(x, y));
-        [[a, b, c], [a, c, d]].map(|t| (7, PageTriangle::new(t, 8).unwrap()))
+        [[a, b, c], [a, c, d]].map(|t| (7, PageTriangle::new(t, [false; 3], 8).unwrap()))
     }
 
     #[test]
@@ -257,10 +289,27 @@ mod tests {
     fn damaged_coordinates_give_nothing() {
         let mut corners = [vertex(0.0, 0.0), vertex(1.0, 0.0), vertex(0.0, 1.0)];
         corners[1].lightmap.x = f32::NAN;
-        assert!(PageTriangle::new(corners, 8).is_none());
+        assert!(PageTriangle::new(corners, [true; 3], 8).is_none());
         corners[1].lightmap.x = 1.0e30;
-        let huge = PageTriangle::new(corners, 8).unwrap();
+        let huge = PageTriangle::new(corners, [true; 3], 8).unwrap();
         assert!(places(8, 2, &[(0, huge)]).len() <= 64 * 4);
+    }
+
+    #[test]
+    fn places_stay_off_the_border_of_a_surface() {
+        let corners = [vertex(0.0, 0.0), vertex(8.0, 0.0), vertex(0.0, 8.0)];
+        let triangle = PageTriangle::new(corners, [true, false, true], 8).unwrap();
+        let (corner, _) = triangle.at(Vec2::ZERO).unwrap();
+        assert!(
+            (corner - Vec3::new(0.5, 0.5, 3.0)).length() < 1e-5,
+            "{corner}"
+        );
+        // the other triangle of a quad continues there
+        let (inner, _) = triangle.at(Vec2::splat(4.0)).unwrap();
+        assert!(
+            (inner - Vec3::new(4.0, 4.0, 3.0)).length() < 1e-5,
+            "{inner}"
+        );
     }
 
     #[test]

@@ -157,8 +157,7 @@ pub fn bake(
     options: &BakeOptions,
     progress: BakeProgress<'_>,
 ) -> Result<Baked, GatherError> {
-    let occluders = Occluders::of_world(world);
-    let targets = Targets::of(world, &occluders, options.pattern);
+    let targets = Targets::of(world, options.pattern);
     let direct = gather.direct(&targets.points, options.samples, &mut |part| {
         progress(BakeStage::Direct, part);
     })?;
@@ -169,6 +168,7 @@ pub fn bake(
     }
     if let Some(dirt) = options.dirt {
         progress(BakeStage::Dirt, 0.0);
+        let occluders = Occluders::of_world(world);
         places.darken(&targets, |point| {
             dirt.part_stored(&occluders, point.position, point.normal)
         });

@@ -1,11 +1,11 @@
 //! Where a map stores light, and the points that stand for each place.
 
-use super::coverage::{PageTriangle, Place, places};
+use super::coverage::{INSET, PageTriangle, Place, places};
 use super::{LitTriangle, Point};
-use crate::occluders::Occluders;
 use crate::world::{RelitWorld, WorldMaterial, WorldSurface};
 use glam::Vec3;
 use q3bsp::SurfaceKind;
+use std::collections::HashSet;
 use std::ops::Range;
 use support::parallel;
 use support::slice::{self, span};
@@ -16,8 +16,8 @@ const LIFT: f32 = 1.0;
 /// Depth inside a brush from which a point is inside, id units, negative inside.
 const INSIDE: f32 = -0.5;
 
-/// Distances by which a point inside of something solid is moved along the surface, id units.
-const MOVES: [f32; 3] = [2.0, 5.0, 9.0];
+/// Distances by which a point inside of something solid is moved towards the middle of its triangle, id units.
+const MOVES: [f32; 2] = [2.0, 5.0];
 
 /// A texel that surfaces cover.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,19 +87,19 @@ fn is_lit_by_vertex(surface: &WorldSurface) -> bool {
 
 impl Targets {
     /// The texels and vertices of a world. `pattern`: points along each side of a texel.
-    pub fn of(world: &RelitWorld, occluders: &Occluders, pattern: u32) -> Targets {
+    pub fn of(world: &RelitWorld, pattern: u32) -> Targets {
         let mut targets = Targets {
             lit: vec![LitTriangle::Dark; world.indices.len() / 3],
             ..Targets::default()
         };
-        targets.add_pages(world, occluders, pattern);
+        targets.add_pages(world, pattern);
         targets.texels = targets.places;
-        targets.add_vertices(world, occluders);
+        targets.add_vertices(world);
         targets.places += world.vertices.len();
         targets
     }
 
-    fn add_pages(&mut self, world: &RelitWorld, occluders: &Occluders, pattern: u32) {
+    fn add_pages(&mut self, world: &RelitWorld, pattern: u32) {
         let count = world.bsp.lightmaps.len() + world.pages.len();
         let mut of_page: Vec<Vec<(u32, PageTriangle)>> = vec![Vec::new(); count];
         let mut sides = vec![0; count];
@@ -117,8 +117,9 @@ impl Targets {
             if side == 0 || !shows_light(world, surface) {
                 continue;
             }
-            for number in surface.triangles() {
-                let Some(triangle) = PageTriangle::new(world.corners(number), side) else {
+            let ends = ends(world, surface);
+            for (number, ends) in surface.triangles().zip(ends) {
+                let Some(triangle) = PageTriangle::new(world.corners(number), ends, side) else {
                     continue;
                 };
                 if let Some(slot) = self.lit.get_mut(number) {
@@ -135,7 +136,7 @@ impl Targets {
         }
         let found = parallel::map(&of_page, |page, triangles| {
             let places = places(slice::item(&sides, page), pattern, triangles);
-            let free = |place: &Place| point(world, occluders, place);
+            let free = |place: &Place| point(world, place);
             let points: Vec<Option<Point>> = places.iter().map(free).collect();
             (places, points)
         });
@@ -166,7 +167,7 @@ impl Targets {
         }
     }
 
-    fn add_vertices(&mut self, world: &RelitWorld, occluders: &Occluders) {
+    fn add_vertices(&mut self, world: &RelitWorld) {
         let base = self.places as u32;
         let mut all = Vec::new();
         for (index, surface) in (0u32..).zip(&world.surfaces) {
@@ -178,14 +179,19 @@ impl Targets {
             };
             let drawn = !matches!(surface.kind, SurfaceKind::Patch);
             let made = world.vertices_of(surface);
+            let middle = (surface.mins + surface.maxs) * 0.5;
             for (k, raw) in (0u32..).zip(world.bsp.surface_vertices(stored)) {
                 let own = made.get(k as usize).filter(|_| drawn);
                 let clean = raw.finite();
                 let place = Place {
                     texel: 0,
                     surface: index,
-                    position: own.map_or(clean.position, |v| v.position),
+                    // a corner lies in the planes of adjacent walls
+                    position: own
+                        .map_or(clean.position, |v| v.position)
+                        .move_towards(middle, INSET),
                     normal: own.map_or(clean.normal.normalize_or(Vec3::Z), |v| v.normal),
+                    middle,
                 };
                 all.push((
                     place,
@@ -204,7 +210,7 @@ impl Targets {
                 }
             }
         }
-        let points = parallel::map(&all, |_, (place, ..)| point(world, occluders, place));
+        let points = parallel::map(&all, |_, (place, ..)| point(world, place));
         for ((place, vertex, drawn), point) in all.into_iter().zip(points) {
             let start = self.points.len() as u32;
             self.points.extend(point);
@@ -218,28 +224,43 @@ impl Targets {
     }
 }
 
-/// The point of a place: above its surface, moved along it if that lies in solid. `None` if no point near it is free.
-fn point(world: &RelitWorld, occluders: &Occluders, place: &Place) -> Option<Point> {
+/// For each triangle of a surface: whether the surface ends at the edge from each corner to the next.
+fn ends(world: &RelitWorld, surface: &WorldSurface) -> Vec<[bool; 3]> {
+    // corners at one place are one, whatever their number
+    let place = |corner: u32| {
+        let vertex = slice::item(&world.vertices, corner as usize);
+        vertex.position.to_array().map(|x| (x + 0.0).to_bits())
+    };
+    let edges = |corners: &[u32; 3]| {
+        let [a, b, c] = corners.map(place);
+        [(a, b), (b, c), (c, a)]
+    };
+    let triangles = world.indices_of(surface).as_chunks::<3>().0;
+    let all: HashSet<_> = triangles.iter().flat_map(edges).collect();
+    let ends = |corners: &[u32; 3]| edges(corners).map(|(a, b)| !all.contains(&(b, a)));
+    triangles.iter().map(ends).collect()
+}
+
+/// The point of a place: above its surface, moved towards the middle of its triangle if that lies in solid. `None` if none of
+/// these is free.
+fn point(world: &RelitWorld, place: &Place) -> Option<Point> {
     let surface = world.surfaces.get(place.surface as usize)?;
     let model = world.models.get(surface.model as usize);
     let origin = model.map_or(Vec3::ZERO, |m| m.origin);
     let normal = place.normal;
-    let on = place.position + origin + normal * LIFT;
-    if surface.model != 0 || is_free(world, on) {
-        return on.is_finite().then_some(Point {
-            position: on,
-            normal,
-        });
+    let lift = origin + normal * LIFT;
+    let to_middle = place.middle - place.position;
+    let moved = |step: f32| place.position + to_middle.clamp_length_max(step);
+    let places = std::iter::once(place.position).chain(MOVES.map(moved));
+    let mut points = places.map(|on| Point {
+        position: on + lift,
+        normal,
+    });
+    match surface.model {
+        0 => points.find(|point| is_free(world, point.position)),
+        // the leafs of the map say nothing about brush models
+        _ => points.find(|point| point.position.is_finite()),
     }
-    let (u, v) = normal.any_orthonormal_pair();
-    let around = [u, -u, v, -v, u + v, u - v, v - u, -u - v];
-    MOVES.iter().find_map(|step| {
-        around.iter().find_map(|direction| {
-            let position = on + *direction * *step;
-            let free = is_free(world, position) && is_outside(occluders, position, normal);
-            free.then_some(Point { position, normal })
-        })
-    })
 }
 
 /// Whether a position is inside of the map and of nothing solid.
@@ -248,10 +269,4 @@ pub(super) fn is_free(world: &RelitWorld, position: Vec3) -> bool {
     position.is_finite()
         && (!leafs || world.bsp.cluster_at(position) >= 0)
         && !world.bsp.is_in_drawn_brush(position, INSIDE)
-}
-
-/// Whether the surface above a position faces it: otherwise it lies behind a wall.
-fn is_outside(occluders: &Occluders, position: Vec3, normal: Vec3) -> bool {
-    let hit = occluders.nearest(position, normal, f32::INFINITY);
-    hit.is_none_or(|hit| hit.front || hit.sky)
 }

@@ -106,7 +106,7 @@ fn floor(world: &RelitWorld, baked: &Baked) -> Vec<(Vec3, Light)> {
         .unwrap();
     let triangles: Vec<_> = floor
         .triangles()
-        .map(|t| coverage::PageTriangle::new(world.corners(t), page.side).unwrap())
+        .map(|t| coverage::PageTriangle::new(world.corners(t), [false; 3], page.side).unwrap())
         .collect();
     let texels = (0..page.side * page.side).map(|texel| {
         let place = Vec2::new((texel % page.side) as f32, (texel / page.side) as f32) + 0.5;
