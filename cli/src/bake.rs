@@ -340,6 +340,7 @@ fn load(args: &BakeArgs, source: &Source, mut bsp: Bsp) -> Result<RelitWorld> {
     world.warnings.extend(external.err());
     if world.calibration.is_none() {
         world.measure_materials(files);
+        world.take_compiled_lights(files);
     }
     world.read_by_hand(files);
     for warning in &world.warnings {

@@ -16,8 +16,8 @@ const float POINT_LIKE = 0.03;
 // Part of the radius of a spot's cone, units, over which the map compiler fades it out.
 const float SPOT_FADE = 32.0;
 
-// Least distance of a point light, units, so that its light is finite.
-const float NEAREST = 1.0;
+// Least distance at which the light of a point is computed, units: q3map2 avoids spots by it.
+const float NEAREST = 16.0;
 
 // Kinds of what a point sees.
 const uint SEEN_TRIANGLE = 0, SEEN_POINT = 1, SEEN_SUN = 2, SEEN_SKY = 3;

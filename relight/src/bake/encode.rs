@@ -17,19 +17,22 @@ pub struct Encoding {
     pub gamma: f32,
     /// Divisor of the value after gamma: q3map2's `-compensate`, for engines without overbright bits.
     pub compensate: f32,
+    /// Whether values are half a step lower, so that the bytes after rounding are those that q3map2 cuts off.
+    pub truncates: bool,
     /// Exponent that ratios of the channels were raised to when the world was loaded.
     pub exponent: f32,
 }
 
 impl Encoding {
     /// The one that inverts how calibration reads a world's stored light; for a world that is not calibrated: bytes in
-    /// proportion to light.
+    /// proportion to light, as a compiler stores them.
     pub fn of(world: &RelitWorld) -> Encoding {
         Encoding {
             // the unit of calibrated light is display white for any gamma
             full: OVERBRIGHT.powf(world.stored_gamma),
             gamma: world.stored_gamma,
             compensate: 1.0,
+            truncates: world.calibration.is_none(),
             exponent: world.color_exponent / world.stored_gamma,
         }
     }
@@ -53,7 +56,12 @@ impl Encoding {
             true => part,
             false => part.powf(self.gamma.recip()),
         };
-        encoded / self.compensate
+        let value = encoded / self.compensate;
+        // rounded later
+        match self.truncates {
+            true => (value - 0.5 / 255.0).max(Vec3::ZERO),
+            false => value,
+        }
     }
 
     /// Bytes of light. A colour with a channel above 255 is scaled down whole, so that its hue stays.
@@ -70,6 +78,7 @@ mod tests {
         full: OVERBRIGHT,
         gamma: 1.0,
         compensate: 1.0,
+        truncates: false,
         exponent: 1.0,
     };
 
@@ -83,6 +92,13 @@ mod tests {
             ..PLAIN
         };
         assert_eq!(half.bytes(Vec3::ONE, 1.0), [32; 3]);
+        let cut_off = Encoding {
+            truncates: true,
+            ..PLAIN
+        };
+        let step = 4.0 / 255.0;
+        let found = cut_off.bytes(Vec3::new(7.9, 3.1, 0.4) * step, 1.0);
+        assert_eq!(found, [7, 3, 0]);
     }
 
     #[test]

@@ -98,7 +98,10 @@ impl BakeOptions {
                 false => Reflectance::Compiler,
             },
             dirt: crate::calibrate::dirt_of_calibrated(world),
-            least: [Vec3::ZERO; 3],
+            least: match calibrated {
+                true => [Vec3::ZERO; 3],
+                false => world.least_light(),
+            },
             grid: true,
             encoding: Encoding::of(world),
         }

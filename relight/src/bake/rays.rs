@@ -27,8 +27,8 @@ const WIDE: f32 = 0.15;
 /// Factor of the rays to a wide triangle; their number if there is one ray to a light.
 const WIDE_RAYS: u32 = 4;
 
-/// Least distance of a point light, id units, so that its light is finite.
-const NEAREST: f32 = 1.0;
+/// Least distance at which the light of a point is computed, id units: q3map2 avoids spots by it.
+const NEAREST: f32 = 16.0;
 
 /// Directions over the sphere in which the sky is searched: with one ray to each light, and with several.
 const SKY_DIRECTIONS: [u32; 2] = [384, 1024];
@@ -58,6 +58,7 @@ struct Unshadowed {
     size: f32,
     /// What the compiler counts as one light, whether it is a sprite: see [`TriangleLight::has_own_cutoff`].
     one: (bool, u32),
+    is_point: bool,
 }
 
 /// For each light of a list the leaf that shadowed a neighbouring point.
@@ -118,7 +119,9 @@ impl Rays<'_> {
         let world = self.world;
         let mut all = Vec::new();
         for (place, &entry) in row.iter().enumerate() {
-            let (value, one) = match world.light_lists.light(entry) {
+            let light = world.light_lists.light(entry);
+            let is_point = matches!(light, LightRef::Point(_));
+            let (value, one) = match light {
                 LightRef::Triangle(index) => {
                     let Some(light) = world.lights.get(index as usize).filter(|l| !l.is_sky) else {
                         continue;
@@ -141,7 +144,8 @@ impl Rays<'_> {
                     (value, (false, entry))
                 }
             };
-            let size = value.max_element();
+            // negative lights take light away
+            let size = value.abs().max_element();
             if size > 0.0 {
                 all.push((
                     place,
@@ -150,12 +154,13 @@ impl Rays<'_> {
                         value,
                         size,
                         one,
+                        is_point,
                     },
                 ));
             }
         }
         if world.light_cutoff > 0.0 {
-            cut_off(&mut all, world.light_cutoff);
+            cut_off(&mut all, world.light_cutoff, world.cutoff_of_points);
         }
         let whole: f32 = all.iter().map(|(_, light)| light.size).sum();
         let mut sizes: Vec<f32> = all.iter().map(|(_, light)| light.size).collect();
@@ -352,8 +357,8 @@ fn cosine(point: &Point, direction: Vec3) -> f32 {
 /// Irradiance over π of a point light of intensity 1, without shadows.
 fn unshadowed_point(point: &Point, light: &PointLight) -> f32 {
     let offset = light.origin - point.position;
+    let cosine = cosine(point, offset.normalize_or_zero());
     let distance = offset.length().max(NEAREST);
-    let cosine = cosine(point, offset / distance);
     if cosine <= 0.0 {
         return 0.0;
     }
@@ -361,13 +366,15 @@ fn unshadowed_point(point: &Point, light: &PointLight) -> f32 {
     light.falloff.irradiance(distance, cosine) * cone / PI
 }
 
-/// Removes lights whose unshadowed light is not above the cutoff; skies and suns are not among them.
-fn cut_off(all: &mut Vec<(usize, Unshadowed)>, cutoff: f32) {
+/// Removes lights whose unshadowed light is not above the cutoff, points alone or all; skies and suns are not among them.
+fn cut_off(all: &mut Vec<(usize, Unshadowed)>, cutoff: f32, of_points: bool) {
     let mut sums: HashMap<(bool, u32), f32> = HashMap::new();
     for (_, light) in all.iter() {
         *sums.entry(light.one).or_default() += light.size;
     }
-    all.retain(|(_, light)| sums.get(&light.one).is_some_and(|sum| *sum > cutoff));
+    all.retain(|(_, light)| {
+        of_points && !light.is_point || sums.get(&light.one).is_some_and(|sum| *sum > cutoff)
+    });
 }
 
 /// Directions evenly over the sphere: a Fibonacci spiral.

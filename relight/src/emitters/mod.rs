@@ -171,6 +171,12 @@ pub enum Falloff {
         /// Where a surface that faces it gets none any more, id units.
         reach: f32,
     },
+    /// The same, but surfaces that it does not light from behind get as much as if they faced it: q3map2's
+    /// `spawnflags 1` without `_anglescale`.
+    LinearAtAnyAngle {
+        /// Where surfaces get none any more, id units.
+        reach: f32,
+    },
 }
 
 impl Falloff {
@@ -184,6 +190,10 @@ impl Falloff {
             Falloff::Linear { reach } => {
                 8.0 / (reach * reach) * (cosine - distance / reach).max(0.0)
             }
+            Falloff::LinearAtAnyAngle { .. } if cosine <= 0.0 => 0.0,
+            Falloff::LinearAtAnyAngle { reach } => {
+                8.0 / (reach * reach) * (1.0 - distance / reach).max(0.0)
+            }
         }
     }
 
@@ -191,7 +201,7 @@ impl Falloff {
     pub fn reach(self) -> Option<f32> {
         match self {
             Falloff::InverseSquare => None,
-            Falloff::Linear { reach } => Some(reach),
+            Falloff::Linear { reach } | Falloff::LinearAtAnyAngle { reach } => Some(reach),
         }
     }
 }

@@ -151,6 +151,18 @@ impl Image {
         Vec3::from_array(sum.map(|s| (s / count) as f32))
     }
 
+    /// Mean colour as stored, each channel 0..=1; alpha plays no part.
+    pub fn mean_stored(&self) -> Vec3 {
+        let mut sum = [0u64; 3];
+        for [r, g, b, _] in self.pixels() {
+            for (sum, byte) in sum.iter_mut().zip([r, g, b]) {
+                *sum += u64::from(byte);
+            }
+        }
+        let count = f64::from(self.width) * f64::from(self.height) * 255.0;
+        Vec3::from_array(sum.map(|s| (s as f64 / count) as f32))
+    }
+
     /// Mean alpha, 0..=1.
     pub fn mean_alpha(&self) -> f32 {
         let sum: u64 = self.pixels().map(|[.., a]| u64::from(a)).sum();

@@ -174,9 +174,35 @@ impl<'a> Finder<'a> {
         clouds + sum / sides.max(1.0)
     }
 
-    /// Colour of the directives' light as the compiler computes it, largest channel 1: the mean of the
-    /// display-encoded image.
+    /// Colour of the directives' light, largest channel 1: the mean of the display-encoded image.
     fn light_color(&mut self, definition: &Shader) -> Vec3 {
+        let encode = |c: Vec3| Vec3::from_array(c.to_array().map(overbright::from_linear));
+        let stages = definition.image_names().collect();
+        let last = [vec![definition.name.as_str()], stages].concat();
+        self.color_by(definition, &last, |image| encode(image.mean_linear()))
+    }
+
+    /// The same as q3map2 computes it: from the mean of the image's bytes. Without `qer_editorimage` it prefers the
+    /// image of the first stage to that of the material's name.
+    pub(super) fn compiler_color(&mut self, definition: &Shader) -> Vec3 {
+        let deduced = match definition.light.editor_image {
+            None => definition.image_names().next(),
+            Some(_) => None,
+        };
+        let last: Vec<&str> = deduced
+            .into_iter()
+            .chain([definition.name.as_str()])
+            .collect();
+        self.color_by(definition, &last, Image::mean_stored)
+    }
+
+    /// Colour by `q3map_lightRGB`, or by the first image that exists; `last`: those after the ones that directives name.
+    fn color_by(
+        &mut self,
+        definition: &Shader,
+        last: &[&str],
+        mean: impl Fn(&Image) -> Vec3,
+    ) -> Vec3 {
         let light = &definition.light;
         if let Some(rgb) = light.light_rgb {
             return normalise(rgb.max(Vec3::ZERO));
@@ -189,13 +215,11 @@ impl<'a> Finder<'a> {
         names.extend(light.light_image.as_deref());
         names.extend(sky_side.as_deref());
         names.extend(light.editor_image.as_deref());
-        names.push(&definition.name);
-        names.extend(definition.image_names());
+        names.extend(last);
         let mean = names
             .into_iter()
-            .find_map(|name| self.image(name).map(Image::mean_linear));
-        let encode = |c: Vec3| Vec3::from_array(c.to_array().map(overbright::from_linear));
-        mean.map_or(Vec3::ONE, |mean| normalise(encode(mean)))
+            .find_map(|name| self.image(name).map(&mean));
+        mean.map_or(Vec3::ONE, normalise)
     }
 
     /// The small copy of an image that was loaded before.

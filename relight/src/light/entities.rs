@@ -23,8 +23,31 @@ const LINEAR_FALLOFF: i64 = 1;
 /// Scale of a linear light: value l gives 7500 l / 8000 at distance 0.
 const LINEAR_SCALE: f32 = 1.0 / 8000.0;
 
+/// Radius of the ball with the volume of a cube of half side 1, over which q3map2 spreads the `_samples` of a light.
+const BALL_OF_CUBE: f32 = 1.240_7;
+
 /// Light entities as point lights and suns.
 pub(crate) fn light_entities(entities: &[Entity]) -> (Vec<PointLight>, Vec<SunLight>) {
+    read_entities(entities, Reading::Traced)
+}
+
+/// Light entities as q3map2 computes their light: points and suns have no extent but that of their `_deviance`, the
+/// light of linear ones does not depend on its angle of incidence, and negative lights take light away.
+pub(super) fn compiled_light_entities(entities: &[Entity]) -> (Vec<PointLight>, Vec<SunLight>) {
+    read_entities(entities, Reading::Compiled)
+}
+
+/// For what light entities are read.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Reading {
+    /// For a tracer: lights have an extent, and strengths are positive.
+    Traced,
+    /// For the light that a map compiler stores.
+    Compiled,
+}
+
+fn read_entities(entities: &[Entity], reading: Reading) -> (Vec<PointLight>, Vec<SunLight>) {
+    let compiled = reading == Reading::Compiled;
     let mut points = Vec::new();
     let mut suns = Vec::new();
     for entity in entities.iter().filter(|e| is_light(e.classname())) {
@@ -33,9 +56,13 @@ pub(crate) fn light_entities(entities: &[Entity]) -> (Vec<PointLight>, Vec<SunLi
         };
         let value = value_of(entity);
         let color = color(entity);
-        if !(value > 0.0 && value.is_finite()) || color == Vec3::ZERO {
+        let usable = value > 0.0 || compiled && value < 0.0;
+        if !(usable && value.is_finite()) || color == Vec3::ZERO {
             continue;
         }
+        let deviance = number(entity, &["_deviance", "_deviation", "_jitter"]).filter(|d| *d > 0.0);
+        let samples = number(entity, &["_samples"]).map_or(1.0, |n| n.trunc().max(1.0));
+        let deviance = deviance.filter(|_| !compiled || samples > 1.0);
         let target = entity.get("target").and_then(|name| {
             let aim = entities.iter().find(|e| {
                 e.get("targetname")
@@ -47,18 +74,31 @@ pub(crate) fn light_entities(entities: &[Entity]) -> (Vec<PointLight>, Vec<SunLi
         if number(entity, &["_sun"]) == Some(1.0) {
             suns.push(SunLight {
                 direction: target.map_or(Vec3::Z, |offset| -offset.normalize_or(Vec3::NEG_Z)),
-                irradiance: color * (value * SUN_IRRADIANCE),
-                angular_radius: number(entity, &["_deviance", "_deviation", "_jitter"])
-                    .filter(|d| *d > 0.0)
-                    .map_or(DEFAULT_SUN_RADIUS, |d| d.min(90.0).to_radians()),
+                irradiance: match compiled {
+                    // q3map2 divides the strength of an entity's sun by its samples twice
+                    true => color * (value / samples * SUN_IRRADIANCE),
+                    false => color * (value * SUN_IRRADIANCE),
+                },
+                angular_radius: match (deviance, compiled) {
+                    (Some(degrees), _) => degrees.min(90.0).to_radians(),
+                    (None, true) => 0.0,
+                    (None, false) => DEFAULT_SUN_RADIUS,
+                },
                 material: None,
             });
             continue;
         }
         let flags = number(entity, &["spawnflags"]).map_or(0, |f| f as i64);
-        let (intensity, falloff) = if flags & LINEAR_FALLOFF != 0 {
+        // a spot's light falls off with the square of the distance whatever its flags
+        let is_linear = flags & LINEAR_FALLOFF != 0 && (!compiled || target.is_none());
+        let (intensity, falloff) = if is_linear {
             let fade = number(entity, &["fade"]).filter(|f| *f > 0.0);
-            linear(value, fade.unwrap_or(1.0))
+            match linear(value, fade.unwrap_or(1.0)) {
+                (intensity, Falloff::Linear { reach }) if compiled => {
+                    (intensity, Falloff::LinearAtAnyAngle { reach })
+                }
+                linear => linear,
+            }
         } else {
             (value * POINT_LIGHT_INTENSITY, Falloff::InverseSquare)
         };
@@ -73,7 +113,10 @@ pub(crate) fn light_entities(entities: &[Entity]) -> (Vec<PointLight>, Vec<SunLi
         points.push(PointLight {
             origin,
             intensity: color * intensity,
-            radius: DEFAULT_POINT_LIGHT_RADIUS,
+            radius: match compiled {
+                true => deviance.unwrap_or(0.0) * BALL_OF_CUBE,
+                false => DEFAULT_POINT_LIGHT_RADIUS,
+            },
             spot,
             falloff,
             pulse: None,
@@ -85,7 +128,8 @@ pub(crate) fn light_entities(entities: &[Entity]) -> (Vec<PointLight>, Vec<SunLi
 /// Value of a light entity. q3map2 subtracts negative lights.
 fn value_of(entity: &Entity) -> f32 {
     let scale = number(entity, &["scale"]).filter(|s| *s != 0.0);
-    number(entity, &["_light", "light"]).unwrap_or(DEFAULT_LIGHT) * scale.unwrap_or(1.0)
+    let light = number(entity, &["_light", "light"]).filter(|light| *light != 0.0);
+    light.unwrap_or(DEFAULT_LIGHT) * scale.unwrap_or(1.0)
 }
 
 /// Number of light entities with a negative value (dark spots), which a light source cannot represent.
@@ -123,7 +167,41 @@ pub(crate) fn ambient(entities: &[Entity]) -> Vec3 {
             .unwrap_or(0.0)
     };
     let value = positive(&["_ambient", "ambient"]).max(positive(&["_minlight"]));
-    color(world) * (value * AMBIENT_RADIANCE)
+    world_color(world) * (value * AMBIENT_RADIANCE)
+}
+
+/// `ambient` alone, as radiance, without the bound `_minlight`.
+pub(super) fn ambient_alone(entities: &[Entity]) -> Vec3 {
+    world_light(entities, &["_ambient", "ambient"])
+}
+
+/// Bounds that a compiler raises light to, as radiance: of texels (`_minlight`), of vertices (`_minvertexlight`) and
+/// of the grid's ambient light (`_mingridlight`); those of the latter two default to the first.
+pub(super) fn least_light(entities: &[Entity]) -> [Vec3; 3] {
+    [
+        world_light(entities, &["_minlight"]),
+        world_light(entities, &["_minvertexlight", "_minlight"]),
+        world_light(entities, &["_mingridlight", "_minlight"]),
+    ]
+}
+
+/// Radiance of the first of these keys of the world that exists, in the colour of the world; none if it is negative.
+fn world_light(entities: &[Entity], keys: &[&str]) -> Vec3 {
+    let Some(world) = entities.first() else {
+        return Vec3::ZERO;
+    };
+    let value = number(world, keys).unwrap_or(0.0).max(0.0);
+    world_color(world) * (value * AMBIENT_RADIANCE)
+}
+
+/// `_color` of the world, which the compiler takes as it is; white when absent or black.
+fn world_color(world: &Entity) -> Vec3 {
+    let color = world.vec3("_color").filter(|c| c.is_finite());
+    let color = color.unwrap_or(Vec3::ZERO).max(Vec3::ZERO);
+    match color == Vec3::ZERO {
+        true => Vec3::ONE,
+        false => color,
+    }
 }
 
 impl RelitWorld {
@@ -227,7 +305,7 @@ mod tests {
         assert_eq!(suns[0].direction, Vec3::Z);
         assert!((suns[0].irradiance.x - PI * 50.0 * 4.0 / 255.0).abs() < 1e-5);
         assert!((suns[0].angular_radius - 2f32.to_radians()).abs() < 1e-7);
-        assert!((ambient(&entities) - Vec3::new(0.0, 1.0, 0.5) * 40.0 / 255.0).length() < 1e-6);
+        assert!((ambient(&entities) - Vec3::new(0.0, 2.0, 1.0) * 40.0 / 255.0).length() < 1e-6);
         assert_eq!(ambient(&[]), Vec3::ZERO);
     }
 
@@ -258,5 +336,39 @@ mod tests {
         let half = near / 4.0;
         let square = Falloff::InverseSquare.irradiance(half, 1.0);
         assert!((light.falloff.irradiance(half, 1.0) / square - 1.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn compiled_lights_are_those_of_the_compiler() {
+        let text = r#"{ "classname" "worldspawn" "ambient" "10" "_minlight" "20" "_mingridlight" "5" }
+            { "classname" "light" "origin" "0 0 0" "light" "-100" }
+            { "classname" "light" "origin" "0 0 0" "light" "0" "_deviance" "8" }
+            { "classname" "light" "origin" "0 0 0" "light" "400" "_deviance" "8" "_samples" "4" }
+            { "classname" "light" "origin" "0 0 0" "light" "300" "spawnflags" "1" "fade" "2" }
+            { "classname" "light" "origin" "0 0 100" "target" "a" "_sun" "1" "light" "60" "_samples" "3" "_deviance" "2" }
+            { "classname" "light" "origin" "0 0 100" "target" "a" "light" "60" "spawnflags" "1" }
+            { "classname" "target_position" "origin" "0 0 0" "targetname" "a" }"#;
+        let entities = entities(text);
+        let (points, suns) = compiled_light_entities(&entities);
+        let strengths: Vec<f32> = points
+            .iter()
+            .map(|p| p.intensity.x / POINT_LIGHT_INTENSITY)
+            .collect();
+        assert!((strengths[0] + 100.0).abs() < 1e-3, "{strengths:?}");
+        // 0 counts as absent; without samples a light has no extent
+        assert!((strengths[1] - 300.0).abs() < 1e-3 && points[1].radius == 0.0);
+        assert!((strengths[2] - 400.0).abs() < 1e-3 && points[2].radius > 8.0);
+        // linear light: 7500 · 300 / 8000 − 2 d at any angle of incidence
+        let linear = points[3];
+        let found = linear.intensity.x * linear.falloff.irradiance(50.0, 0.1) / SUN_IRRADIANCE;
+        assert!((found - (281.25 - 100.0)).abs() < 1e-2, "{found}");
+        assert_eq!(linear.falloff.irradiance(50.0, -0.1), 0.0);
+        assert_eq!(points[4].falloff, Falloff::InverseSquare);
+        assert!((suns[0].irradiance.x - 20.0 * SUN_IRRADIANCE).abs() < 1e-5);
+        assert!((suns[0].angular_radius - 2f32.to_radians()).abs() < 1e-7);
+        let bytes = |light: Vec3| (light.x / AMBIENT_RADIANCE).round();
+        assert_eq!(bytes(ambient_alone(&entities)), 10.0);
+        assert_eq!(least_light(&entities).map(bytes), [20.0, 20.0, 5.0]);
+        assert_eq!(bytes(ambient(&entities)), 20.0);
     }
 }

@@ -4,6 +4,7 @@
 mod bounds;
 mod by_hand;
 mod color;
+mod compiled;
 mod emission;
 mod entities;
 mod fallback;
@@ -14,6 +15,7 @@ mod materials;
 mod occlusion;
 mod receivers;
 mod sight;
+mod sky_suns;
 mod solid;
 mod surfaces;
 mod sweep;

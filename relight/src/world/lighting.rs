@@ -26,6 +26,7 @@ pub struct Lighting {
     color_exponent: f32,
     stored_gamma: f32,
     light_cutoff: f32,
+    cutoff_of_points: bool,
     exposure: Option<Exposure>,
 }
 
@@ -48,6 +49,7 @@ impl RelitWorld {
             color_exponent: self.color_exponent,
             stored_gamma: self.stored_gamma,
             light_cutoff: self.light_cutoff,
+            cutoff_of_points: self.cutoff_of_points,
             exposure: self.exposure,
         }
     }
@@ -71,6 +73,7 @@ impl RelitWorld {
         self.color_exponent = lighting.color_exponent;
         self.stored_gamma = lighting.stored_gamma;
         self.light_cutoff = lighting.light_cutoff;
+        self.cutoff_of_points = lighting.cutoff_of_points;
         self.exposure = lighting.exposure;
     }
 }

@@ -87,6 +87,8 @@ pub struct RelitWorld {
     /// modes leave out contributions below one step of light. 0: no cutoff. Suns and skies have none. Found by
     /// [calibration](crate::calibrate()).
     pub light_cutoff: f32,
+    /// Whether the light cutoff applies to point lights alone, as in q3map2 without `-fast`.
+    pub cutoff_of_points: bool,
     /// Exposure at which the world's light on the map's textures has the mean brightness of the engine's picture:
     /// found by [calibration](crate::calibrate()). `None`: see [`display_exposure`](Self::display_exposure).
     pub exposure: Option<Exposure>,

@@ -86,6 +86,8 @@ pub struct MapLightSource<'a> {
     pub ambient: Vec3,
     /// Irradiance / π below which the map compiler drops a light's contribution; 0: no cutoff.
     pub light_cutoff: f32,
+    /// Whether the cutoff applies to point lights alone.
+    pub cutoff_of_points: bool,
     /// The map's tree; `None`: every point uses the list of all lights.
     pub bsp: Option<&'a Bsp>,
     /// Occluders for visibility rays; `None`: visibility comes from the lists alone.
@@ -105,6 +107,7 @@ impl<'a> MapLightSource<'a> {
             model_origins: &[],
             ambient: Vec3::ZERO,
             light_cutoff: 0.0,
+            cutoff_of_points: false,
             bsp: None,
             occlusion: None,
         }
@@ -204,7 +207,7 @@ pub(super) fn triangle_bounds(light: &t::TriangleLight) -> t::LightBounds {
 /// For each light, the irradiance over pi below which its contribution is 0. The map compiler made one light per
 /// triangle; of a sprite it made one light in all, so that each quad's cutoff is its share. Skies have no cutoff.
 pub(super) fn ends(source: &MapLightSource<'_>) -> Vec<f32> {
-    if source.light_cutoff <= 0.0 {
+    if source.light_cutoff <= 0.0 || source.cutoff_of_points {
         return vec![0.0; source.triangles.len()];
     }
     let mut areas: HashMap<u32, f32> = HashMap::new();

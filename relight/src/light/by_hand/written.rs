@@ -150,7 +150,7 @@ fn write_point(f: &mut fmt::Formatter<'_>, light: &PointLight) -> fmt::Result {
         (None, Falloff::InverseSquare) => {
             writeln!(f, "point {place} {} {radius}", written(value))
         }
-        (None, Falloff::Linear { reach }) => {
+        (None, Falloff::Linear { reach } | Falloff::LinearAtAnyAngle { reach }) => {
             let strength = light.intensity.max_element();
             let (number, fade) = value_and_fade(strength, reach);
             let light = written(light.intensity / strength * number);

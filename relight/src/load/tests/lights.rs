@@ -389,3 +389,110 @@ fn lights_have_the_colours_that_show_on_the_maps_textures() {
         }
     }
 }
+
+/// A world with the lights that q3map2 makes of its map.
+fn compiled(map: MapBuilder) -> RelitWorld {
+    let mut world = relight(map);
+    world.take_compiled_lights(&game());
+    world
+}
+
+/// A room with a lamp at its ceiling.
+fn lamp_room() -> MapBuilder {
+    let mut map = MapBuilder::new();
+    let wall = map.add_shader("t/wall", 0, 1);
+    let lamp = map.add_shader("t/lamp", 0, 1);
+    map.add_room(wall, Vec3::splat(-128.0), Vec3::splat(128.0));
+    map.add_quad(lamp, ceiling_lamp(16.0, 127.0));
+    map
+}
+
+#[test]
+fn compiled_lights_are_those_that_q3map2_makes() {
+    let mut map = lamp_room();
+    let glow = map.add_shader("t/glow", 0, 1);
+    let sprite = map.add_shader("t/sprite", 0, 1);
+    map.add_quad(glow, ceiling_lamp(16.0, 100.0));
+    map.add_quad(sprite, ceiling_lamp(8.0, 50.0));
+    map.set_world_key("ambient", "10");
+    map.set_world_key("_minlight", "20");
+    map.add_entity(&[
+        ("classname", "light"),
+        ("origin", "0 0 0"),
+        ("light", "-50"),
+    ]);
+    let world = compiled(map);
+
+    let color = Vec3::new(1.0, 128.0 / 255.0, 0.0);
+    let [lamps, splashes] = world.lights.as_chunks::<2>().0 else {
+        panic!("glow emits nothing: {:?}", world.lights)
+    };
+    for light in lamps {
+        assert!((light.radiance - color * (3.0 * 1000.0 / 255.0)).length() < 1e-3);
+        assert!((light.normal() - Vec3::NEG_Z).length() < 1e-6);
+    }
+    for (splash, lamp) in splashes.iter().zip(lamps) {
+        // 7 times 5 per cent, 23 units in front, turned round
+        assert!((splash.radiance - lamp.radiance * 0.35).length() < 1e-3);
+        assert!((splash.normal() - Vec3::Z).length() < 1e-6);
+        assert!(splash.vertices.iter().all(|v| (v.z - 104.0).abs() < 1e-3));
+    }
+    let [dark, fire] = world.point_lights[..] else {
+        panic!("{:?}", world.point_lights)
+    };
+    assert!((dark.intensity + Vec3::splat(50.0 * POINT_LIGHT_INTENSITY)).length() < 0.1);
+    assert!((fire.origin - Vec3::new(0.0, 0.0, 50.0)).length() < 1e-3);
+    assert!((fire.intensity - Vec3::splat(100.0 * POINT_LIGHT_INTENSITY)).length() < 0.1);
+    let bytes = |light: Vec3| (light.x * 255.0 / 4.0).round();
+    assert_eq!(bytes(world.ambient), 10.0);
+    assert_eq!(world.least_light().map(bytes), [20.0; 3]);
+}
+
+#[test]
+fn splashes_in_solid_are_dropped() {
+    let mut map = lamp_room();
+    let wall = map.add_shader("t/wall", 0, 1);
+    map.add_box_brush(
+        wall,
+        Vec3::new(-64.0, -64.0, 90.0),
+        Vec3::new(64.0, 64.0, 115.0),
+    );
+    assert_eq!(compiled(map).lights.len(), 2);
+}
+
+#[test]
+fn rays_give_what_q3map2_stores_of_points() {
+    use crate::bake::{Gather, Point, Rays};
+    let stored = |light: &str, height: f32| {
+        let mut map = MapBuilder::new();
+        let wall = map.add_shader("t/wall", 0, 1);
+        map.add_room(wall, Vec3::splat(-256.0), Vec3::splat(256.0));
+        map.add_entity(&[
+            ("classname", "light"),
+            ("origin", "0 0 0"),
+            ("light", light),
+        ]);
+        let world = compiled(map);
+        let point = Point {
+            position: Vec3::NEG_Z * height,
+            normal: Vec3::Z,
+        };
+        let found = Rays::new(&world).direct(&[point], 0, &mut |_| ());
+        found.unwrap()[0].value.x * 255.0 / 4.0
+    };
+    for (light, height, expected) in [
+        ("100", 100.0, 75.0),
+        ("-100", 100.0, -75.0),
+        // one step at most is left out
+        ("1", 90.0, 0.0),
+        ("1", 80.0, 7500.0 / 6400.0),
+        // nearer than 16 units it is as at 16
+        ("1", 4.0, 7500.0 / 256.0),
+    ] {
+        let found = stored(light, height);
+        assert!(
+            (found - expected).abs() < 1e-2,
+            "{light} at {height}: {found}"
+        );
+    }
+}
