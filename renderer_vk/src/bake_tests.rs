@@ -148,3 +148,44 @@ fn the_gpu_finds_the_light_that_the_cpu_finds() {
         }
     }
 }
+
+/// Points of a map's light grid in open leafs. Some lie in the plane of a surface.
+fn grid_points(world: &RelitWorld, step: usize) -> Vec<Point> {
+    let layout = world.bsp.light_grid_layout(1 << 23).expect("a grid");
+    let [nx, ny, _] = layout.counts;
+    let all = (0..layout.points()).step_by(step);
+    all.map(|i| layout.position(i % nx, i / nx % ny, i / nx / ny))
+        .filter(|at| world.bsp.cluster_at(*at) >= 0)
+        .map(|position| Point {
+            position,
+            normal: Vec3::ZERO,
+        })
+        .collect()
+}
+
+#[test]
+fn points_of_the_light_grid_have_the_light_that_the_cpu_finds() {
+    let Some(files) = openarena() else {
+        return;
+    };
+    let files: Arc<dyn GameFiles> = Arc::new(files);
+    let world = load(&*files, "maps/kaos2.bsp");
+    let points = grid_points(&world, 5);
+    let options = GatherOptions {
+        tracer: TracerChoice::Compute,
+        ..GatherOptions::default()
+    };
+    let made = GpuGather::new(&options, Arc::clone(&files), &world);
+    let Some(mut gpu) = testkit::device(made.map_err(|e| e.to_string())) else {
+        return;
+    };
+    let mut cpu = Rays::new(&world);
+    let nothing = &mut |_| {};
+    for samples in [0, 8] {
+        let found = gpu.direct(&points, samples, nothing).expect("light");
+        let exact = cpu.direct(&points, samples, nothing).expect("light");
+        let [median, most, mean] = differences(&found, &exact);
+        println!("{samples} samples: median {median}, 90 % {most}, mean {mean}");
+        assert!(median < 0.005 && most < 0.06 && mean.abs() < 0.02);
+    }
+}

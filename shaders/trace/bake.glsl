@@ -13,6 +13,10 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) buffer BakeEstimate
 
 #define BAKE (BakeViews(push.bake).bake)
 
+// Rays start at this distance, units, so that a point in the plane of a surface, such as one of the light grid, is not in
+// its shadow. Above the lift of coplanar surfaces (`renderer_vk/src/trace/lifted.rs`).
+const float RAY_START = 0.02;
+
 // Whether a point has no surface, so that light from each direction counts fully.
 bool has_no_surface(BakePoint point) { return point.normal == vec3(0.0); }
 

@@ -28,7 +28,7 @@ use crate::gpu::{
 };
 use crate::scene::{TracedPart, TracedScene, View};
 
-/// Most points of a chunk: 24 bytes of each up and 24 down, for two chunks at a time.
+/// Most points of a chunk: 24 bytes of each up and 24 down, for two chunks at a time, which have 80 bytes a point.
 const MOST_POINTS: usize = 1 << 18;
 /// Least and first number of points of a chunk.
 const LEAST_POINTS: usize = 1 << 8;
@@ -82,10 +82,15 @@ impl Chunk {
     }
 
     fn upload(&self, points: &[Point]) -> Result<(), Error> {
+        // rays must be finite
+        let is_finite = |point: &&Point| point.position.is_finite() && point.normal.is_finite();
         let points: Vec<t::BakePoint> = (points.iter())
-            .map(|point| t::BakePoint {
-                position: point.position,
-                normal: point.normal,
+            .map(|point| match Some(point).filter(is_finite) {
+                Some(point) => t::BakePoint {
+                    position: point.position,
+                    normal: point.normal,
+                },
+                None => t::BakePoint::default(),
             })
             .collect();
         self.points.write(0, bytemuck::cast_slice(&points))

@@ -395,6 +395,15 @@ fn points_without_surface_have_no_cosine(gpu: &mut Gpu) {
     scene.point(Vec3::new(3.0, 104.0, 20.0), 1000.0, 4.0);
     let found = direct(gpu, &scene, &[free], 16)[0];
     assert_near(found.value.x, 1000.0 / 100.0f32.powi(2) / PI, 1e-4);
+    // the plane of a floor that a point of the grid lies in hides nothing above it
+    let mut scene = floor();
+    scene.point(Vec3::new(3.0, 4.0, 100.0), 1000.0, 4.0);
+    let on_plane = Point {
+        position: Vec3::new(3.0, 4.0, 0.0),
+        normal: Vec3::ZERO,
+    };
+    let found = direct(gpu, &scene, &[on_plane], 16)[0];
+    assert_near(found.value.x, 1000.0 / 100.0f32.powi(2) / PI, 1e-4);
     let mut scene = self::scene();
     let triangle = [
         Vec3::new(-40.0, -40.0, 60.0),
