@@ -232,6 +232,18 @@ fn plan(bsp: &Bsp, wanted: &[Wanted], options: &LayoutOptions<'_>) -> Result<Pla
     let area: u64 = (items.iter())
         .map(|item| u64::from(item.width) * u64::from(item.height))
         .sum();
+    // a hostile map may have far more surfaces than pages could hold
+    let whole = u64::from(most) * u64::from(most);
+    let least = usize::try_from(area.div_ceil(whole)).unwrap_or(usize::MAX);
+    if least > options.most_pages.saturating_mul(2) {
+        return Ok(Plan {
+            charts,
+            places: Vec::new(),
+            pages: least,
+            side: most,
+            without,
+        });
+    }
     loop {
         let next = side.saturating_mul(2).min(most);
         let fits = longest.is_none_or(|longest| longest <= side)

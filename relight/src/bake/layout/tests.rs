@@ -344,6 +344,49 @@ fn hostile_positions_are_laid_out_or_left() {
     }
 }
 
+#[test]
+fn a_map_of_many_large_surfaces_is_refused_at_once() {
+    let mut map = MapBuilder::new();
+    for name in 0..3000 {
+        let wall = map.add_shader(&format!("w{name}"), 0, 1);
+        let corners = [(0., 0.), (0., 4096.), (4096., 4096.), (4096., 0.)];
+        map.add_quad(wall, corners.map(|(x, y)| Vec3::new(x, y, 0.0)));
+    }
+    let mut bsp = unlit(map);
+    let error = make(&mut bsp, &LayoutOptions::internal(&plain)).unwrap_err();
+    assert!(
+        matches!(error, LayoutError::TooMany { needed: 3000, .. }),
+        "{error}"
+    );
+}
+
+#[test]
+fn damaged_maps_are_laid_out_or_refused() {
+    let mut map = MapBuilder::new();
+    let wall = map.add_shader("w", 0, 1);
+    map.add_room(wall, Vec3::ZERO, Vec3::splat(512.0));
+    half_cylinder(&mut map, 64.0, 128.0);
+    let file = unlit(map).write();
+    let values = [
+        -1,
+        1,
+        i32::MAX,
+        f32::NAN.to_bits() as i32,
+        1e30f32.to_bits() as i32,
+    ];
+    let offsets = (0..file.len() - 4).step_by(8);
+    testkit::poke_words(&file, offsets, &values, |damaged| {
+        let Ok(mut bsp) = Bsp::parse(damaged) else {
+            return false;
+        };
+        if let Ok(report) = make(&mut bsp, &LayoutOptions::internal(&plain)) {
+            check(&bsp, &report, 1);
+            Bsp::parse(&bsp.write()).unwrap();
+        }
+        true
+    });
+}
+
 proptest! {
     #![proptest_config(testkit::cases(32))]
 

@@ -11,7 +11,7 @@ use crate::bake::page::Page;
 use crate::files::GameFiles;
 use crate::materials::Materials;
 use crate::overbright::MAP_OVERBRIGHT_BITS;
-use q3bsp::{Bsp, ShaderId, ShaderRef, lightmap_index};
+use q3bsp::{Bsp, ShaderId, ShaderRef, SurfaceKind, lightmap_index};
 use std::collections::{BTreeMap, BTreeSet};
 use support::hash::Hash;
 
@@ -77,14 +77,18 @@ pub fn scripted(
     let mut made: BTreeMap<(ShaderId, i32), ShaderId> = BTreeMap::new();
     let mut known: BTreeSet<String> = BTreeSet::new();
     for surface in bsp.surfaces.iter_mut().filter(|s| s.lightmap >= 0) {
-        let key = (surface.shader, surface.lightmap);
+        let page = std::mem::replace(&mut surface.lightmap, lightmap_index::BY_VERTEX);
+        if !matches!(surface.kind, SurfaceKind::Planar | SurfaceKind::Patch) {
+            continue; // engines ignore its page
+        }
+        let key = (surface.shader, page);
         let shader = match made.get(&key) {
             Some(shader) => *shader,
             None => {
                 let Some(old) = bsp.shaders.get(surface.shader.index()).cloned() else {
                     continue;
                 };
-                let image = path(map, usize::try_from(surface.lightmap).unwrap_or(0))?;
+                let image = path(map, usize::try_from(page).unwrap_or(0))?;
                 let body = with_image(files, materials, &old.name, &image);
                 let new = script_name(name, &old.name, &body);
                 if known.insert(new.clone()) {
@@ -99,7 +103,6 @@ pub fn scripted(
             }
         };
         surface.shader = shader;
-        surface.lightmap = lightmap_index::BY_VERTEX;
     }
     set_pages(bsp, Vec::new());
     out.push(GameFile {
