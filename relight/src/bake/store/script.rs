@@ -10,7 +10,9 @@ use shaderscript::token::{Lexer, Reading, Token};
 /// the engine makes of its image.
 ///
 /// The engine shifts pages in a map by the overbright bits and not images, which therefore have the shifted light. `rgbGen
-/// identityLighting` then gives the same picture with every `r_overBrightBits`.
+/// identityLighting` then gives the same picture with every `r_overBrightBits`. `nomipmaps` holds for the images of all stages
+/// after it: it comes before the stage of the image, last where the order of two stages may be changed. Where stages follow,
+/// `nopicmip` keeps the size of the image (`r_picmip` is 1 in ioquake3).
 pub(super) fn with_image(
     files: &dyn GameFiles,
     materials: &Materials,
@@ -24,8 +26,9 @@ pub(super) fn with_image(
     written.unwrap_or_else(|| {
         let name = shaderscript::strip_extension(name);
         format!(
-            "{{\n\t{{\n\t\tmap {image}\n\t\ttcGen lightmap\n\t\trgbGen identityLighting\n\t}}\n\
-             \t{{\n\t\tmap {name}.tga\n\t\tblendFunc GL_DST_COLOR GL_ZERO\n\t\trgbGen identityLighting\n\t}}\n}}\n"
+            "{{\n\t{{\n\t\tmap {name}.tga\n\t\trgbGen identityLighting\n\t}}\n\tnomipmaps\n\
+             \t{{\n\t\tmap {image}\n\t\tblendFunc GL_DST_COLOR GL_ZERO\n\t\trgbGen identityLighting\n\
+             \t\ttcGen lightmap\n\t}}\n}}\n"
         )
     })
 }
@@ -104,17 +107,24 @@ fn replaced(tokens: &[Token], light: &[Option<BakedLight>], image: &str) -> Stri
         .collect();
     let mut kept = keep.iter();
     stages.retain(|_| kept.next() == Some(&true));
-    show_image(&mut stages, image);
+    let at = show_image(&mut stages, image);
+    let directive = match at.is_some_and(|at| at + 1 == stages.len()) {
+        true => "\tnomipmaps\n",
+        false => "\tnopicmip\n",
+    };
     let mut text = "{\n".to_owned();
-    let (mut stages, mut kept) = (stages.iter(), keep.iter());
+    let (mut stages, mut kept) = (stages.iter().enumerate(), keep.iter());
     for line in &body {
         if !line.1.is_empty() {
             write(&mut text, line);
-        } else if kept.next() == Some(&true) {
-            text += "\t{\n";
-            for line in stages.next().into_iter().flatten() {
-                write(&mut text, line);
+        } else if kept.next() == Some(&true)
+            && let Some((number, stage)) = stages.next()
+        {
+            if at == Some(number) {
+                text += directive;
             }
+            text += "\t{\n";
+            stage.iter().for_each(|line| write(&mut text, line));
             text += "\t}\n";
         }
     }
@@ -142,12 +152,12 @@ fn is_page(line: &[String]) -> bool {
     }
 }
 
-/// Puts the image into the stages that show the page.
+/// Puts the image into the stages that show the page. Returns the first of them.
 ///
 /// Engines draw the first two stages at once, with the colour of the first, if one multiplies the other and both have the
 /// same `rgbGen` and nothing else in particular (`CollapseMultitexture`). That stays: where both are `identity`, both become
 /// `identityLighting`. Two passes would darken triangles that compilers left double.
-fn show_image(stages: &mut [Vec<Line>], image: &str) {
+fn show_image(stages: &mut [Vec<Line>], image: &str) -> Option<usize> {
     let shows: Vec<bool> = (stages.iter())
         .map(|stage| stage.iter().any(|(_, line)| is_page(line)))
         .collect();
@@ -158,7 +168,8 @@ fn show_image(stages: &mut [Vec<Line>], image: &str) {
         _ => false,
     };
     let of_pair = together && shows.iter().take(2).filter(|shows| **shows).count() == 1;
-    for (number, (stage, shows)) in stages.iter_mut().zip(shows).enumerate() {
+    let at = shows.iter().position(|shows| *shows);
+    for (number, (stage, &shows)) in stages.iter_mut().zip(&shows).enumerate() {
         let changes = shows || (of_pair && number < 2);
         if !changes {
             continue;
@@ -184,6 +195,17 @@ fn show_image(stages: &mut [Vec<Line>], image: &str) {
         if !generated {
             add(["rgbGen", "identityLighting"]);
         }
+    }
+    match stages {
+        [light, texture] if of_pair && at == Some(0) => {
+            // a product has no order
+            let is_blend = |line: &Line| line.1.first().is_some_and(|word| is(word, "blendFunc"));
+            light.extend(texture.iter().filter(|line| is_blend(line)).cloned());
+            texture.retain(|line| !is_blend(line));
+            stages.swap(0, 1);
+            Some(1)
+        }
+        _ => at,
     }
 }
 
@@ -247,14 +269,14 @@ mod tests {
         let text = written(script, "textures/wall");
         assert_eq!(
             text,
-            "{\n\tsurfaceparm nomarks\n\tq3map_surfacelight 200\n\t{\n\t\tmap maps/m/lm_0000.tga\n\
-             \t\trgbGen identityLighting\n\t\ttcGen lightmap\n\t}\n\t{\n\t\tmap textures/wall.tga\n\
-             \t\tblendFunc filter\n\t\trgbGen identityLighting\n\t}\n\tcull none\n}\n"
+            "{\n\tsurfaceparm nomarks\n\tq3map_surfacelight 200\n\t{\n\t\tmap textures/wall.tga\n\
+             \t\trgbGen identityLighting\n\t}\n\tnomipmaps\n\t{\n\t\tmap maps/m/lm_0000.tga\n\
+             \t\trgbGen identityLighting\n\t\ttcGen lightmap\n\t\tblendFunc filter\n\t}\n\tcull none\n}\n"
         );
         let shader = parse_script("s", format!("new\n{text}").as_bytes())
             .shaders
             .remove(0);
-        assert_eq!(baked_light(&shader.stages)[0], Some(BakedLight::Main));
+        assert_eq!(baked_light(&shader.stages), [None, Some(BakedLight::Main)]);
         assert_eq!(shader.surface_params, ["nomarks"]);
     }
 
@@ -293,7 +315,7 @@ mod tests {
         let map = |name: &str| StageImage::Map(name.to_owned());
         assert_eq!(
             images,
-            [map("maps/m/lm_0000.tga"), map("textures/floor.tga")]
+            [map("textures/floor.tga"), map("maps/m/lm_0000.tga")]
         );
     }
 }
