@@ -259,6 +259,24 @@ pub fn load(
     settings: &Settings,
 ) -> anyhow::Result<(Bsp, Vec<RefEntity>)> {
     renderer.begin_registration(files, settings)?;
+    load_registered(renderer, path)
+}
+
+/// As [`load`], with the scripts and images of the map before: only the map itself has changed.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_again(
+    renderer: &mut Renderer,
+    files: Arc<dyn GameFiles>,
+    path: &str,
+    settings: &Settings,
+) -> anyhow::Result<(Bsp, Vec<RefEntity>)> {
+    renderer.renew_registration(files, settings)?;
+    load_registered(renderer, path)
+}
+
+fn load_registered(renderer: &mut Renderer, path: &str) -> anyhow::Result<(Bsp, Vec<RefEntity>)> {
     renderer.load_world(path)?;
     renderer.end_registration();
     let bsp = renderer.world().map(|w| w.relit.bsp.clone());

@@ -77,7 +77,8 @@ pub fn run(args: &WatchArgs) -> Result<()> {
         followed: None,
     };
     let (mut start, options) = args.window.start(source)?;
-    let work = start.cache.join(format!("watch-{}", std::process::id()));
+    remove_old(&start.cache);
+    let work = start.cache.join(format!("{WORK}{}", std::process::id()));
     let source = match is_source {
         true => Some((file.clone(), compiler(args, &game, &work)?)),
         false => None,
@@ -91,6 +92,23 @@ pub fn run(args: &WatchArgs) -> Result<()> {
     // made by the first compile
     let _ = std::fs::remove_dir_all(work);
     shown
+}
+
+/// Beginning of the names of folders for compilers.
+const WORK: &str = "watch-";
+
+/// Removes folders of programs that were killed: those a day old.
+fn remove_old(cache: &Path) {
+    const OLD: Duration = Duration::from_secs(24 * 3600);
+    let folders = std::fs::read_dir(cache).into_iter().flatten().flatten();
+    for folder in folders {
+        let is_work = folder.file_name().to_string_lossy().starts_with(WORK);
+        let modified = folder.metadata().and_then(|data| data.modified()).ok();
+        if is_work && modified.is_some_and(|at| at.elapsed().is_ok_and(|age| age > OLD)) {
+            // it costs only space
+            let _ = std::fs::remove_dir_all(folder.path());
+        }
+    }
 }
 
 /// What compiles a `.map`; `None` if nothing is installed.
@@ -179,7 +197,15 @@ fn write_pictures(
         };
         let shown = follow.shown;
         if printed.as_ref() != Some(&(line.clone(), shown)) {
-            println!("{line}");
+            match follow.state {
+                State::Shown(Some(seconds)) => {
+                    println!(
+                        "{line}: {seconds:.3} s, of these {:.3} s reading",
+                        follow.read
+                    );
+                }
+                _ => println!("{line}"),
+            }
             if let (State::Failed, Some(problem)) = (follow.state, &follow.problem) {
                 println!("{problem}");
             }
@@ -209,6 +235,25 @@ fn write_pictures(
 mod tests {
     use super::*;
 
+    // elsewhere a folder's time cannot be set
+    #[cfg(unix)]
+    #[test]
+    fn folders_of_killed_programs_are_removed() {
+        let cache = tempfile::tempdir().unwrap();
+        let path = |name: &str| cache.path().join(name);
+        for name in ["watch-1", "watch-2", "other"] {
+            std::fs::create_dir(path(name)).unwrap();
+        }
+        let long_ago = std::time::SystemTime::now() - Duration::from_secs(3 * 24 * 3600);
+        for name in ["watch-1", "other"] {
+            let folder = std::fs::File::open(path(name)).unwrap();
+            folder.set_modified(long_ago).unwrap();
+        }
+        remove_old(cache.path());
+        assert!(!path("watch-1").exists());
+        assert!(path("watch-2").exists() && path("other").exists());
+    }
+
     #[test]
     fn a_map_in_the_folder_of_a_game_is_read_with_it() {
         let folder = tempfile::tempdir().unwrap();
@@ -219,9 +264,10 @@ mod tests {
         let base = vec![PathBuf::from("/games/baseq3")];
         assert_eq!(game_of(&file, &usual), [usual[0].clone(), game.clone()]);
         assert_eq!(game_of(&file, &base), [base[0].clone(), game.clone()]);
-        assert_eq!(game_of(&file, &[game.clone()]), [game.clone()]);
+        let own = vec![game.clone()];
+        assert_eq!(game_of(&file, &own), own);
         std::fs::write(game.join("pak0.pk3"), "x").unwrap();
-        assert_eq!(game_of(&file, &usual), [game.clone()]);
+        assert_eq!(game_of(&file, &usual), own);
         assert_eq!(game_of(&file, &base), [base[0].clone(), game.clone()]);
         let elsewhere = folder.path().join("room.map");
         assert_eq!(game_of(&elsewhere, &usual), usual);

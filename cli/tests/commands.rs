@@ -169,6 +169,31 @@ fn what_was_never_there_is_refused_by_its_name() {
 }
 
 #[test]
+fn only_maps_in_folders_that_exist_are_watched() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    for (file, more, printed) in [
+        ("room.txt", &[][..], "a .map or .bsp file is watched"),
+        ("none/room.map", &[], "no such folder"),
+        (
+            "room.map",
+            &["--compiler", "/no/such/q3map2"],
+            "no such program",
+        ),
+    ] {
+        let file = path(file);
+        let cache = path("cache");
+        let refused = output(
+            RELIGHT,
+            &[&["watch", file.as_str(), "--cache", cache.as_str()], more].concat(),
+        );
+        assert!(!refused.status.success(), "{file}: {refused:?}");
+        let text = String::from_utf8(refused.stderr).unwrap();
+        assert!(text.contains(printed), "{text}");
+    }
+}
+
+#[test]
 fn samples_are_written_as_packs_and_never_over_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let pack = folder.path().join("surfaces.pk3");

@@ -240,10 +240,10 @@ mod tests {
         other.swap(0, 4);
         assert_ne!(read(&map(&other, ""))[0].geometry, plain);
         // a word that is split differently is another
-        let joined = map(&["a bc"], "");
+        let joined = map(&["a bc\n"], "");
         assert_ne!(
             read(&joined)[0].geometry,
-            read(&map(&["ab c"], ""))[0].geometry
+            read(&map(&["ab c\n"], ""))[0].geometry
         );
     }
 

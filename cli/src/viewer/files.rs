@@ -8,7 +8,7 @@ use relight::CalibrationCache;
 
 use super::lights::{Editor, lights_path};
 use super::source::{Changed, Finder, Progress};
-use super::state::{FOV, Map, Viewer};
+use super::state::{FOV, Map, Scripts, Viewer};
 use crate::scripts::load_scripts;
 use crate::view::{self, Camera};
 
@@ -18,18 +18,32 @@ impl Viewer {
     /// # Errors
     /// It cannot be read, or the device is out of memory.
     pub(super) fn load(&mut self) -> Result<()> {
+        self.load_with(None)
+    }
+
+    /// Loads the map with the scripts and images of the one that is shown: only the map itself has changed.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub(super) fn load_again(&mut self) -> Result<()> {
+        let scripts = self.map.as_ref().map(|map| Arc::clone(&map.scripts));
+        self.load_with(scripts)
+    }
+
+    fn load_with(&mut self, scripts: Option<Arc<Scripts>>) -> Result<()> {
         let (files, name) = self.source.open()?;
         // a map that cannot be read leaves the one that is shown
         let bytes = files.read(&name)?.unwrap_or_default();
         Bsp::parse(&bytes).with_context(|| name.clone())?;
-        let scripts = load_scripts(&*files);
-        let loaded = view::load(
-            &mut self.renderer,
-            Arc::clone(&files),
-            &name,
-            &self.settings,
-        );
-        let (bsp, entities) = loaded?;
+        let (renderer, settings) = (&mut self.renderer, &self.settings);
+        let own = Arc::clone(&files);
+        let ((bsp, entities), scripts) = match scripts {
+            Some(scripts) => (view::load_again(renderer, own, &name, settings)?, scripts),
+            None => {
+                let scripts = Arc::new(load_scripts(&*files));
+                (view::load(renderer, own, &name, settings)?, scripts)
+            }
+        };
         let mut cameras = Vec::new();
         if let Some(camera) = Camera::of_map(&bsp) {
             cameras.push(("intermission".to_owned(), camera));
@@ -71,7 +85,7 @@ impl Viewer {
         self.picked = None;
         self.keep_edits();
         self.found = false;
-        self.finder = None;
+        self.keep_finder();
         Ok(())
     }
 

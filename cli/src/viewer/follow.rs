@@ -9,6 +9,7 @@ use relight::light::{ChangeableLights, LightsByHand};
 use renderer_vk::MapLightChoice;
 
 use super::lights::Editor;
+use super::source::{Finder, Progress};
 use super::state::{Viewer, Wake};
 use crate::watched::{Compiled, Files, News, SourceText, Watched};
 
@@ -39,10 +40,14 @@ pub struct Follow {
     pub note: Option<String>,
     /// Number of versions that have been shown.
     pub shown: u32,
+    /// Seconds that reading the newest version took, without its first picture.
+    pub read: f32,
     /// Seconds that the compiler took.
     compiled: Option<f32>,
     /// A version that the next picture shows, and when it was saved.
     pending: Option<Option<SystemTime>>,
+    /// The search for the lights of an earlier version.
+    finder: Option<Finder>,
     /// Changes of lights that are not saved, kept while another map or other lights are loaded.
     edits: Option<LightsByHand>,
 }
@@ -59,8 +64,10 @@ impl Follow {
             problem: None,
             note: None,
             shown: 0,
+            read: 0.0,
             compiled: None,
             pending: None,
+            finder: None,
             edits: None,
         }
     }
@@ -159,16 +166,17 @@ impl Viewer {
         text: Option<Arc<SourceText>>,
         saved: Option<SystemTime>,
     ) {
+        let begin = Instant::now();
         let before = self.source.followed.clone();
         if let Some(followed) = &mut self.source.followed {
             followed.map = Some(map);
             followed.text = text;
         }
-        let loaded = self.load();
+        let loaded = self.load_again();
         if loaded.is_err() {
             self.source.followed = before;
         }
-        self.loaded(loaded, saved);
+        self.loaded(loaded, begin, saved);
     }
 
     /// Lights the map by other entities: at once, or by loading it again.
@@ -179,22 +187,24 @@ impl Viewer {
         if self.map.is_none() {
             return; // the compiled map will be shown with them
         }
+        let begin = Instant::now();
         self.keep_edits();
         self.with_follow(|follow| follow.compiled = None);
         let changed = match self.renderer.light_by_entities(text.entities()) {
             Ok(true) => Ok(()),
-            Ok(false) => self.load(),
+            Ok(false) => self.load_again(),
             Err(e) => Err(e.into()),
         };
-        self.loaded(changed, Some(saved));
+        self.loaded(changed, begin, Some(saved));
     }
 
-    fn loaded(&mut self, loaded: Result<()>, saved: Option<SystemTime>) {
+    fn loaded(&mut self, loaded: Result<()>, begin: Instant, saved: Option<SystemTime>) {
         self.message = None;
         self.complete_frames = 0;
         self.with_follow(|follow| match loaded {
             Ok(()) => {
                 follow.pending = Some(saved);
+                follow.read = begin.elapsed().as_secs_f32();
                 follow.problem = None;
                 // a compiler may still be at work on a newer text
                 if !matches!(follow.state, State::Compiles(_)) || follow.compiled.is_some() {
@@ -221,15 +231,28 @@ impl Viewer {
                 follow.state = State::Shown(saved.map(after));
             }
         });
+        self.follow_title();
     }
 
     /// Whether the map's lights are searched in its lightmaps: not before its first picture, and not if a `.map` states
     /// them.
-    pub(super) fn needs_finder(&self) -> bool {
+    pub(super) fn needs_finder(&mut self) -> bool {
+        if self.source.followed.is_none() {
+            return true;
+        }
+        // that of the map before cannot be ended
+        let old = self
+            .follow
+            .as_mut()
+            .and_then(|follow| follow.finder.as_mut());
+        if old.is_some_and(|finder| matches!(finder.update(), Progress::Part(_))) {
+            return false;
+        }
+        self.with_follow(|follow| follow.finder = None);
+        let world = self.renderer.world();
         let Some(followed) = &self.source.followed else {
             return true;
         };
-        let world = self.renderer.world();
         followed.files.source.is_none()
             && self.settings.rt_lights == MapLightChoice::Calibrated
             && self.complete_frames > 1
@@ -241,6 +264,16 @@ impl Viewer {
         let editor = self.editor.take().filter(Editor::is_changed);
         if let (Some(follow), Some(editor)) = (&mut self.follow, editor) {
             follow.edits = Some(editor.file());
+        }
+    }
+
+    /// Keeps a search for lights until it ends.
+    pub(super) fn keep_finder(&mut self) {
+        let finder = self.finder.take();
+        if let Some(follow) = &mut self.follow
+            && follow.finder.is_none()
+        {
+            follow.finder = finder;
         }
     }
 

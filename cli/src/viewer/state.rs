@@ -85,12 +85,15 @@ pub enum Handle {
     Light,
 }
 
+/// The materials of a game and the diagnostics of its scripts.
+pub type Scripts = (Materials, Vec<Diagnostic>);
+
 /// The loaded map.
 pub struct Map {
     /// Its game path.
     pub name: String,
     pub files: Arc<dyn GameFiles>,
-    pub scripts: (Materials, Vec<Diagnostic>),
+    pub scripts: Arc<Scripts>,
     pub entities: Vec<RefEntity>,
     /// Cameras by name.
     pub cameras: Vec<(String, Camera)>,

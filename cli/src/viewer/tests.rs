@@ -1,5 +1,7 @@
 //! The viewer without a window: events in, pictures looked at.
 
+mod follow;
+
 use std::path::Path;
 use std::time::Duration;
 
@@ -36,24 +38,25 @@ fn write_sample(folder: &Path) {
     }
 }
 
-/// A viewer of the sample in a folder, by this name; `None` without a device.
-fn viewer(folder: &Path, map: &str) -> Option<Viewer> {
-    let renderer = testkit::device(Renderer::new(RendererOptions {
-        validation: true,
-        ..RendererOptions::headless(SIZE.0, SIZE.1)
-    }))?;
-    let start = Start {
-        source: Source {
-            chosen: ChosenMap {
-                map: Some(map.to_owned()),
-                sample: None,
-                game: Game {
-                    paths: vec![folder.to_owned()],
-                },
+/// A map by this name, in a folder that is the game.
+fn source_of(folder: &Path, map: &str) -> Source {
+    Source {
+        chosen: ChosenMap {
+            map: Some(map.to_owned()),
+            sample: None,
+            game: Game {
+                paths: vec![folder.to_owned()],
             },
-            lights: None,
-            followed: None,
         },
+        lights: None,
+        followed: None,
+    }
+}
+
+/// Options of a small, coarse viewer of the sample in a folder.
+fn start_of(folder: &Path) -> Start {
+    Start {
+        source: source_of(folder, "sample"),
         cache: folder.join("cache"),
         shown: Shown::Classic,
         settings: Settings {
@@ -64,8 +67,24 @@ fn viewer(folder: &Path, map: &str) -> Option<Viewer> {
             view: None,
             spawn: Some(0),
         },
-    };
-    let mut viewer = Viewer::new(renderer, start, Box::new(|| ())).unwrap();
+    }
+}
+
+/// `None` without a device.
+fn viewer_of(start: Start) -> Option<Viewer> {
+    let renderer = testkit::device(Renderer::new(RendererOptions {
+        validation: true,
+        ..RendererOptions::headless(SIZE.0, SIZE.1)
+    }))?;
+    Some(Viewer::new(renderer, start, Box::new(|| ())).unwrap())
+}
+
+/// A viewer of the sample in a folder, by this name; `None` without a device.
+fn viewer(folder: &Path, map: &str) -> Option<Viewer> {
+    let mut viewer = viewer_of(Start {
+        source: source_of(folder, map),
+        ..start_of(folder)
+    })?;
     for _ in 0..3 {
         frame(&mut viewer, []);
     }
@@ -133,7 +152,8 @@ fn until(viewer: &mut Viewer, what: &str, done: impl Fn(&Viewer) -> bool) {
         std::thread::sleep(Duration::from_millis(5));
         frame(viewer, []);
     }
-    panic!("{what}: {:?}", viewer.message);
+    let problem = viewer.followed().and_then(|follow| follow.problem.as_ref());
+    panic!("{what}: {:?} {problem:?}", viewer.message);
 }
 
 /// Mean difference of the columns `from..to` of the rows above the status line.

@@ -208,3 +208,181 @@ impl Source {
         }
     }
 }
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use relight::GameFiles;
+    use relight::sample::Sample;
+    use std::path::PathBuf;
+    use std::time::Duration;
+
+    /// In place of a compiler: a map without surfaces, or what the text demands.
+    const SCRIPT: &str = r#"
+for file; do :; done
+if grep -q broken "$file"; then echo first; echo "no such shader"; exit 1; fi
+if grep -q hole "$file"; then echo 1 2 3 > "${file%.map}.lin"; fi
+cp "$(dirname "$0")/ready" "${file%.map}.bsp"
+"#;
+
+    fn text(shader: &str, light: u32) -> String {
+        format!(
+            "{{\n\"classname\" \"worldspawn\"\n{{\n( 0 0 0 ) ( 1 0 0 ) ( 0 1 0 ) {shader} 0 0 0 1 1 0 0 0\n}}\n}}\n{{\n\"classname\" \"light\"\n\"origin\" \"1 2 {light}\"\n}}\n"
+        )
+    }
+
+    struct Room {
+        folder: tempfile::TempDir,
+        follower: Follower,
+    }
+
+    impl Room {
+        fn new(compiles: bool) -> Self {
+            let folder = tempfile::tempdir().unwrap();
+            let path = |name: &str| folder.path().join(name);
+            let files = Sample::Hall.files().unwrap();
+            let map = files.read(Sample::Hall.map()).unwrap().unwrap();
+            std::fs::write(path("ready"), map).unwrap();
+            std::fs::write(path("compile.sh"), SCRIPT).unwrap();
+            let stages = [path("compile.sh").display().to_string()];
+            // a shell, because a program that has just been written may be busy
+            let compiler = Compiler::new("/bin/sh".into(), &stages, &[], path("work"));
+            let follower = Follower::new(Files {
+                bsp: path("room.bsp"),
+                source: Some((path("room.map"), compiles.then_some(compiler))),
+            });
+            Self { folder, follower }
+        }
+
+        fn path(&self, name: &str) -> PathBuf {
+            self.folder.path().join(name)
+        }
+
+        fn save(&self, text: &str) {
+            std::fs::write(self.path("room.map"), text).unwrap();
+        }
+
+        /// News up to the first that is wanted.
+        fn until(&mut self, wanted: impl Fn(&News) -> bool) -> Vec<News> {
+            let mut all = Vec::new();
+            for _ in 0..2000 {
+                all.extend(self.follower.step());
+                if all.iter().any(&wanted) {
+                    return all;
+                }
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            panic!("{all:?}");
+        }
+    }
+
+    fn is_map(news: &News) -> bool {
+        matches!(news, News::Map { .. })
+    }
+
+    fn is_failed(news: &News) -> bool {
+        matches!(news, News::Failed(_))
+    }
+
+    #[test]
+    fn surfaces_are_compiled_and_lights_are_not() {
+        let mut room = Room::new(true);
+        assert!(room.follower.step().is_empty());
+        room.save(&text("base/wall", 1));
+        let news = room.until(is_map);
+        let [
+            News::Compiles,
+            News::Compiled { note: None, .. },
+            News::Map {
+                text: Some(lit), ..
+            },
+        ] = &news[..]
+        else {
+            panic!("{news:?}")
+        };
+        assert_eq!(lit.entities()[1].get("origin"), Some("1 2 1"));
+        // the mapper's own compiled map is not written
+        assert!(!room.path("room.bsp").exists());
+
+        room.save(&text("base/wall", 22));
+        let news = room.until(|new| matches!(new, News::Entities { .. }));
+        let [News::Entities { text: lit, .. }] = &news[..] else {
+            panic!("{news:?}")
+        };
+        assert_eq!(lit.entities()[1].get("origin"), Some("1 2 22"));
+
+        room.save(&text("base/floors", 22));
+        assert_eq!(room.until(is_map).len(), 3);
+
+        room.save(&text("broken", 22));
+        let news = room.until(is_failed);
+        let Some(News::Failed(why)) = news.last() else {
+            panic!("{news:?}")
+        };
+        assert_eq!(why, "q3map2: failed (1)\nfirst\nno such shader");
+        // saved once more, it is compiled once more
+        room.save(&text("broken", 333));
+        assert_eq!(room.until(is_failed).len(), 2);
+
+        room.save(&text("hole", 1));
+        let news = room.until(is_map);
+        let Some(News::Compiled {
+            note: Some(note), ..
+        }) = news.get(1)
+        else {
+            panic!("{news:?}")
+        };
+        assert!(
+            note.contains("leaks") && note.contains("room.lin"),
+            "{note}"
+        );
+        assert!(room.path("room.lin").is_file());
+        room.save(&text("base/wall", 1));
+        room.until(is_map);
+        assert!(!room.path("room.lin").exists());
+
+        room.save("{ \"classname\" \"worldspawn\"");
+        let news = room.until(is_failed);
+        let Some(News::Failed(why)) = news.last() else {
+            panic!("{news:?}")
+        };
+        assert!(why.contains("room.map: line 1: the file ends"), "{why}");
+    }
+
+    #[test]
+    fn a_compiled_map_beside_the_text_is_shown_with_its_lights() {
+        let mut room = Room::new(true);
+        room.save(&text("base/wall", 1));
+        std::fs::copy(room.path("ready"), room.path("room.bsp")).unwrap();
+        // newer than the text: nothing is compiled
+        let news = room.until(is_map);
+        let [
+            News::Map {
+                text: Some(_), map, ..
+            },
+        ] = &news[..]
+        else {
+            panic!("{news:?}")
+        };
+        assert_eq!(map.place, room.path("room.bsp"));
+        room.save(&text("base/wall", 22));
+        let news = room.until(|new| matches!(new, News::Entities { .. }));
+        assert_eq!(news.len(), 1);
+    }
+
+    #[test]
+    fn without_a_compiler_new_surfaces_are_reported() {
+        let mut room = Room::new(false);
+        room.save(&text("base/wall", 1));
+        std::fs::copy(room.path("ready"), room.path("room.bsp")).unwrap();
+        room.until(is_map);
+        room.save(&text("base/floors", 1));
+        let news = room.until(is_failed);
+        let Some(News::Failed(why)) = news.last() else {
+            panic!("{news:?}")
+        };
+        assert!(why.contains("--compiler"), "{why}");
+        room.save(&text("base/floors", 333));
+        room.until(|new| matches!(new, News::Entities { .. }));
+    }
+}

@@ -310,6 +310,41 @@ mod tests {
     }
 
     #[test]
+    fn lights_of_entities_are_replaced_and_others_stay() {
+        use crate::materials::Materials;
+        use crate::sample::Sample;
+        let files = Sample::Hall.files().unwrap();
+        let (materials, _) = Materials::load(&files);
+        let options = crate::Options {
+            calibrate: None,
+            ..crate::Options::default()
+        };
+        let mut world = RelitWorld::load(&files, &materials, Sample::Hall.map(), options).unwrap();
+        let (before, own) = (world.lights.clone(), world.suns.clone());
+        assert!(own.iter().all(|sun| sun.material.is_some()));
+        let text = r#"{ "classname" "worldspawn" "ambient" "10" }
+            { "classname" "light" "origin" "1 2 3" "light" "200" }
+            { "classname" "light" "origin" "0 0 9" "target" "a" "_sun" "1" "light" "50" }
+            { "classname" "target_position" "origin" "0 0 0" "targetname" "a" }"#;
+        assert!(world.replace_light_entities(&entities(text)));
+        assert_eq!(world.point_lights.len(), 1);
+        assert_eq!(world.suns.len(), own.len() + 1);
+        let raised = raise(Vec3::splat(10.0 * AMBIENT_RADIANCE), world.color_exponent);
+        assert!((world.ambient - raised).length() < 1e-6);
+        assert_eq!(world.light_lists.row(-1).len(), before.len() + 1);
+        // once more, with other entities: nothing of the first is left
+        let text = r#"{ "classname" "worldspawn" }"#;
+        assert!(world.replace_light_entities(&entities(text)));
+        assert!(world.point_lights.is_empty());
+        assert_eq!((&world.suns, &world.lights), (&own, &before));
+        assert_eq!(world.ambient, Vec3::ZERO);
+        // a map of entities alone, and without any
+        world.lights.clear();
+        world.suns.clear();
+        assert!(!world.replace_light_entities(&entities(text)));
+    }
+
+    #[test]
     fn linear_lights_give_what_the_compiler_computes() {
         let text = r#"{ "classname" "worldspawn" }
             { "classname" "light" "origin" "0 0 0" "light" "300" "spawnflags" "1" "fade" "2" }"#;

@@ -18,6 +18,7 @@ pub mod prepare;
 mod skins;
 mod source;
 mod textures;
+mod unlit;
 
 use std::sync::Arc;
 
@@ -93,6 +94,19 @@ impl Assets {
             texture_mode: settings.texture_mode,
             anisotropy: settings.anisotropy(),
         })
+    }
+
+    /// Begins another registration with the scripts and [images](Textures::renew) that are loaded.
+    pub fn renew(&mut self, files: Arc<dyn GameFiles>, settings: &Settings) {
+        self.textures.renew(files);
+        self.materials = Materials::new(
+            Arc::clone(&self.scripts),
+            MaterialSettings::new(settings),
+            &mut self.textures,
+        );
+        self.models = Models::default();
+        self.skins = Skins::default();
+        self.fonts.clear();
     }
 
     /// Settings for assets that are loaded from now on. Between `BeginRegistration` and the map, a game may change a

@@ -217,6 +217,14 @@ fn lightmap_and_image_are_one_pass() {
         let white = |i: usize| stages[i].flags & c::STAGE_NO_LIGHTMAP != 0;
         assert!(white(0) && !white(1));
     }
+    // in a map that was compiled without light they are lit by rays, as one image under light
+    let other = game.find("t/wall", LightmapClass::Vertex, true);
+    assert_eq!(game.materials.plain_image(game.materials.get(other)), None);
+    game.materials.light_unlit([other].into_iter());
+    let unlit = game.materials.get(other);
+    let flags = game.materials.stages(unlit)[0].flags;
+    assert_eq!(flags & c::STAGE_NO_LIGHTMAP, 0);
+    assert!(game.materials.plain_image(unlit).is_some());
 }
 
 #[test]

@@ -145,6 +145,35 @@ impl Textures {
         Ok(textures)
     }
 
+    /// Begins another registration with the images that are loaded, and other files that have the same images. Lightmaps,
+    /// images below `maps/` and dynamic textures are dropped, and missing images are looked for again.
+    pub fn renew(&mut self, files: Arc<dyn GameFiles>) {
+        self.files = files;
+        self.scratch.clear();
+        self.failure = None;
+        let mut dropped: Vec<u32> = Vec::new();
+        dropped.extend(
+            self.lightmaps
+                .iter()
+                .map(|(_, image)| image.texture_index()),
+        );
+        self.lightmaps.clear();
+        self.textures.retain(|texture| {
+            let of_map = texture.name.to_ascii_lowercase().starts_with("maps/");
+            let stays = texture.image.is_some() && !of_map;
+            if !stays {
+                dropped.extend(texture.image.as_ref().map(gpu::Image::texture_index));
+            }
+            stays
+        });
+        for index in dropped {
+            self.means.remove(&index);
+            self.transparent.remove(&index);
+        }
+        let names = self.textures.iter().map(|texture| texture.name.clone());
+        self.by_name = names.zip(0..).collect();
+    }
+
     /// The game's files.
     pub fn files(&self) -> &Arc<dyn GameFiles> {
         &self.files

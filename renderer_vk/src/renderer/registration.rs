@@ -45,6 +45,27 @@ impl Renderer {
         Ok(())
     }
 
+    /// Begins a registration, and keeps scripts and images: only files below `maps/` may differ from those of the
+    /// registration before.
+    ///
+    /// # Errors
+    /// The device is out of memory.
+    pub fn renew_registration(
+        &mut self,
+        files: Arc<dyn GameFiles>,
+        settings: &Settings,
+    ) -> Result<(), Error> {
+        self.show_finished()?;
+        let Some(mut assets) = self.assets.take() else {
+            return self.begin_registration(files, settings);
+        };
+        self.shutdown_registration();
+        self.settings = settings.clone();
+        assets.renew(files, settings);
+        self.assets = Some(assets);
+        Ok(())
+    }
+
     /// Ends a registration: compiles the pipelines of the registered materials.
     pub fn end_registration(&mut self) {
         // pipelines that are missing after a failure are compiled at first use

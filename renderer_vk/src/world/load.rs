@@ -121,6 +121,9 @@ impl WorldData {
             source,
             options,
         );
+        if relit.page(0).is_none() {
+            materials.light_unlit(surfaces.iter().map(|surface| surface.material));
+        }
         let mut vertices: Vec<Vertex> = relit.vertices.iter().map(|v| vertex(v, options)).collect();
         for (index, surface) in surfaces.iter_mut().enumerate() {
             if materials.get(surface.material).uses_normals() {
