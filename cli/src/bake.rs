@@ -16,6 +16,7 @@ use relight::bake::store::{self, GameFile};
 use relight::bake::{
     BakeOptions, BakeStage, Baked, BakedPage, Gather, Page, Stored, bake, light_bytes, seams,
 };
+use relight::calibrate::Dirt;
 use relight::export::Output;
 use relight::light::LightColor;
 use relight::{
@@ -80,6 +81,12 @@ pub struct BakeArgs {
     /// What computes: cpu, gpu, or part of a Vulkan device's name; default: a GPU, else the CPU
     #[arg(long, value_name = "NAME")]
     device: Option<String>,
+    /// Darken places near surfaces, as the compiler's -dirty; bounces do that without it
+    #[arg(long)]
+    dirty: bool,
+    /// Write the output early with direct light, and again with a bounce, before it is done
+    #[arg(long)]
+    preview: bool,
     /// Write pages of directions to the light between those of light, for engines with deluxe mapping
     #[arg(long)]
     deluxe: bool,
@@ -136,8 +143,14 @@ fn bake_map(args: &BakeArgs, map: &str, output: &Path) -> Result<()> {
         bsp,
     };
     let mut lit = source.bsp.clone();
-    add_lights_of_source(&mut lit, map)?;
-    let mut world = load(args, &source, lit)?;
+    let is_own = add_lights_of_source(&mut lit, map)?;
+    let mut world = load(args, &source, lit, is_own)?;
+    if world.light_count() == 0 {
+        log::warn!(
+            "{}: no light source is known: light entities are read from the .map file beside a .bsp file",
+            source.name
+        );
+    }
     let mut changed = source.bsp.clone();
     // numbered images beside the map are its pages
     let mut external = args.external;
@@ -150,38 +163,31 @@ fn bake_map(args: &BakeArgs, map: &str, output: &Path) -> Result<()> {
         world = with_layout(&source, &changed, world);
     }
     let loaded = begin.elapsed();
-    let options = options(args, &world);
     let mut gather = bake_device::gather(args.device.as_deref(), &source.files, &world)?;
-    let baked = bake_with_bar(&world, &mut *gather, &options)?;
-    let encoding = options.encoding;
-    let mut pages = baked.pages(&world, &changed, encoding);
-    if laid_out {
-        seams::match_seams(&world, &mut pages);
-    }
-    let stored = baked.store_beside_pages(&world, &mut changed, encoding);
-    if baked.pages.is_empty() && stored == Stored::default() {
-        bail!(
-            "{}: nothing in it stores light: no lightmaps, no vertices that are lit, no light grid",
-            source.name
-        );
-    }
-    report(&source, &stored, &baked, (!laid_out).then_some(&pages));
-    if args.deluxe {
-        let directions = baked.directions(&world, &changed, DirectionSpace::Model);
-        pages = interleave(&mut changed, pages, directions, DirectionSpace::Model);
-    }
-    let beside = match external {
-        None => {
-            store::internal(&mut changed, &pages)?;
-            Vec::new()
-        }
-        Some(External::Numbered) => numbered(&mut changed, &source.name, &pages)?,
-        Some(External::Scripted) => {
-            let (files, materials) = (&*source.files, &source.materials);
-            scripted(&mut changed, &source.name, &pages, files, materials)?
-        }
+    let job = Job {
+        source: &source,
+        world: &world,
+        map: &changed,
+        laid_out,
+        external,
+        deluxe: args.deluxe,
+        output,
     };
-    write(&source, &changed, &beside, output)?;
+    let options = options(args, &world);
+    if args.preview {
+        for early in early_rounds(&options) {
+            job.round(&mut *gather, &early)?;
+            println!(
+                "{}: {:.1} s: {} of {} bounces",
+                output.display(),
+                begin.elapsed().as_secs_f64(),
+                early.bounces,
+                options.bounces
+            );
+        }
+    }
+    let (baked, pages, stored) = job.round(&mut *gather, &options)?;
+    report(&source, &stored, &baked, (!laid_out).then_some(&pages));
     println!(
         "{}: {:.1} s, {:.1} s of these for {} by {}",
         output.display(),
@@ -194,6 +200,82 @@ fn bake_map(args: &BakeArgs, map: &str, output: &Path) -> Result<()> {
         gather.name(),
     );
     Ok(())
+}
+
+/// Rounds before the last, which are shown early: direct light by one ray to each light, then with a bounce.
+fn early_rounds(last: &BakeOptions) -> [BakeOptions; 2] {
+    let rough = BakeOptions {
+        pattern: 1,
+        samples: 0,
+        bounces: 0,
+        dirt: None,
+        grid: false,
+        ..*last
+    };
+    let better = BakeOptions {
+        bounces: last.bounces.min(1),
+        rays: last.rays.min(16),
+        ..rough
+    };
+    [rough, better]
+}
+
+/// What is baked, and where to.
+struct Job<'a> {
+    source: &'a Source,
+    world: &'a RelitWorld,
+    /// The map that gets the light.
+    map: &'a Bsp,
+    laid_out: bool,
+    external: Option<External>,
+    deluxe: bool,
+    output: &'a Path,
+}
+
+impl Job<'_> {
+    /// Bakes with these options, and writes the output.
+    fn round(
+        &self,
+        gather: &mut dyn Gather,
+        options: &BakeOptions,
+    ) -> Result<(Baked, Vec<Page>, Stored)> {
+        let Job { source, world, .. } = self;
+        let baked = bake_with_bar(world, gather, options)?;
+        let encoding = options.encoding;
+        let mut map = self.map.clone();
+        let mut pages = baked.pages(world, &map, encoding);
+        if self.laid_out {
+            seams::match_seams(world, &mut pages);
+        }
+        let stored = baked.store_beside_pages(world, &mut map, encoding);
+        if baked.pages.is_empty() && stored == Stored::default() {
+            bail!(
+                "{}: nothing in it stores light: no lightmaps, no vertices that are lit, no light grid",
+                source.name
+            );
+        }
+        let all = match self.deluxe {
+            true => {
+                let space = DirectionSpace::Model;
+                let directions = baked.directions(world, &map, space);
+                interleave(&mut map, pages.clone(), directions, space)
+            }
+            false => pages.clone(),
+        };
+        let beside = match self.external {
+            None => {
+                store::internal(&mut map, &all)?;
+                Vec::new()
+            }
+            Some(External::Numbered) => numbered(&mut map, &source.name, &all)?,
+            Some(External::Scripted) => {
+                let (files, materials) = (&*source.files, &source.materials);
+                scripted(&mut map, &source.name, &all, files, materials)?
+            }
+        };
+        write(source, &map, &beside, self.output)?;
+        Ok((baked, pages, stored))
+    }
 }
 
 /// Whether surfaces of a world have lightmaps.
@@ -287,16 +369,16 @@ fn write(source: &Source, bsp: &Bsp, beside: &[GameFile], output: &Path) -> Resu
 }
 
 /// Adds the light entities of the `.map` file beside a `.bsp` file: compilers leave them out of the map, and read that file
-/// for light. Does nothing for a map without that file, or with light entities of its own.
+/// for light. False without that file, or for a map with light entities of its own.
 ///
 /// # Errors
 /// The file cannot be read.
-fn add_lights_of_source(bsp: &mut Bsp, map: &str) -> Result<()> {
+fn add_lights_of_source(bsp: &mut Bsp, map: &str) -> Result<bool> {
     let source = Path::new(map).with_extension("map");
     let own = bsp.entities();
     let is_light = |entity: &Entity| entity.classname().to_ascii_lowercase().starts_with("light");
     if !Path::new(map).is_file() || !source.is_file() || own.iter().any(is_light) {
-        return Ok(());
+        return Ok(false);
     }
     let text = std::fs::read(&source).with_context(|| format!("{}", source.display()))?;
     let entities = map_text::parse(&text).with_context(|| format!("{}", source.display()))?;
@@ -318,14 +400,14 @@ fn add_lights_of_source(bsp: &mut Bsp, map: &str) -> Result<()> {
     }
     bsp.entities.extend_from_slice(lights.as_bytes());
     log::info!("{}: {count} light entities", source.display());
-    Ok(())
+    Ok(true)
 }
 
-/// Loads a map with light as it is stored.
-fn load(args: &BakeArgs, source: &Source, mut bsp: Bsp) -> Result<RelitWorld> {
+/// Loads a map with light as it is stored. `is_own`: its lights are known.
+fn load(args: &BakeArgs, source: &Source, mut bsp: Bsp, is_own: bool) -> Result<RelitWorld> {
     let files = &*source.files;
     let external = external_lightmaps(&mut bsp, files, &source.name);
-    let stored = !bsp.lightmaps.is_empty() && !args.no_calibration;
+    let stored = !bsp.lightmaps.is_empty() && !args.no_calibration && !is_own;
     let calibrate = stored.then(|| CalibrationOptions {
         cache: args.cache.as_ref().map(CalibrationCache::new),
         ..CalibrationOptions::default()
@@ -358,6 +440,9 @@ fn options(args: &BakeArgs, world: &RelitWorld) -> BakeOptions {
     options.samples = args.samples.unwrap_or(options.samples);
     options.bounces = args.bounce.unwrap_or(options.bounces);
     options.grid = !args.no_grid;
+    if args.dirty {
+        options.dirt = options.dirt.or(Some(Dirt::DEFAULT));
+    }
     if let Some(gamma) = args.gamma {
         options.encoding.set_gamma(gamma);
     }
