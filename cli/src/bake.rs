@@ -54,7 +54,7 @@ pub struct BakeArgs {
     #[arg(long, value_name = "N")]
     bounce: Option<u32>,
     /// Shadow rays from a point to each light; 0: one to its middle, for hard shadows
-    #[arg(long, value_name = "N")]
+    #[arg(long)]
     samples: Option<u32>,
     /// Points along each side of a texel, 1 to 8
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=8))]

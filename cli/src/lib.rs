@@ -62,15 +62,17 @@ mod tests {
     use super::{command, lab};
 
     /// Options whose description differs between commands, such as a file in one and a folder in another.
-    const DESCRIBED_APART: [&str; 10] = [
+    const DESCRIBED_APART: [&str; 12] = [
         "cache",
         "calibrate",
+        "device",
         "frames",
         "json",
         "look",
         "made",
         "output",
         "reference",
+        "samples",
         "tracer",
         "view",
     ];

@@ -89,7 +89,7 @@ fn the_gpu_finds_the_light_that_the_cpu_finds() {
     // a sun through hellfog, which filters light here
     for (map, tracers, bounds) in [
         ("maps/kaos2.bsp", tracers, [0.003, 0.04, 0.01]),
-        ("maps/am_galmevish.bsp", &tracers[..1], [0.02, 0.5, 0.05]),
+        ("maps/am_galmevish.bsp", &tracers[..1], [0.02, 0.5, 0.08]),
     ] {
         let world = load(&*files, map);
         let points = points(&world, 400);
@@ -134,7 +134,7 @@ fn the_gpu_finds_the_light_that_the_cpu_finds() {
             let reflected = gpu.reflected(&points, lit, 256, nothing).expect("light");
             let [median, most, mean] = differences(&reflected, &bounced);
             println!("{tracer:?} reflected: median {median}, 90 % {most}, mean {mean}");
-            assert!(median < 0.03 && most < 0.1 && mean.abs() < 0.01);
+            assert!(median < 0.03 && most < 0.1 && mean.abs() < 0.02);
             let messages = gpu.validation_messages();
             assert!(messages.is_empty(), "{messages:#?}");
             let [few, some] = direct;

@@ -25,7 +25,7 @@ void main() {
     uint first = list.suns + list.directions;
     for (uint i = 0; i < list.count; i++) {
         uint key;
-        float size = max_component(see(first + i, list, point, key).light);
+        float size = size_of(see(first + i, list, point, key));
         if (!(size > 0.0)) continue;
         whole += size;
         // the exponent of a float is the power of two below it

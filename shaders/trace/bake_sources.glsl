@@ -37,6 +37,9 @@ struct Source {
     float size; // radius of a sphere; cosine of the radius of a sun
 };
 
+// Its light in the brightest channel; negative lights take light away.
+float size_of(Source s) { return max_component(abs(s.light)); }
+
 // Irradiance by a triangle of radiance 1, over pi; `middle`: the middle of its part above the horizon. Half the sum over the
 // edges of angle times cosine (Lambert); the corners are relative to the point.
 float polygon_light(vec3 a, vec3 b, vec3 c, vec3 normal, out vec3 middle) {
@@ -92,7 +95,7 @@ void see_triangle(TriangleLight light, BakePoint point, inout Source s) {
         part = free ? s.omega / PI : polygon_light(s.a, s.b, s.c, point.normal, s.target);
     }
     s.light = light.radiance * part;
-    if (max_component(s.light) < light.end) s.light = vec3(0.0);
+    if (size_of(s) < light.end) s.light = vec3(0.0);
     s.rays = rays_of(length(area) / squared);
     s.middle = push.samples == 0;
 }
@@ -112,7 +115,7 @@ void see_point(BakePointLight light, BakePoint point, inout Source s) {
         part *= along > 0.0 ? clamp((along * light.tan_half_angle - aside) / SPOT_FADE, 0.0, 1.0) : 0.0;
     }
     s.light = light.intensity * part;
-    if (max_component(s.light) < light.end) s.light = vec3(0.0);
+    if (size_of(s) < light.end) s.light = vec3(0.0);
     s.middle = push.samples == 0 || light.radius <= 0.0;
     s.rays = s.middle ? 1 : push.samples;
 }

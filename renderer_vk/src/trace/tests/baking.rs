@@ -20,6 +20,7 @@ gpu_tests! {
     ],
     any: [
         falloff_and_cone_are_those_of_the_compiler,
+        negative_lights_take_light_away,
         suns_shine_through_the_sky,
         a_sky_lights_by_what_is_visible_of_it,
         a_light_ends_at_its_cutoff,
@@ -245,6 +246,21 @@ fn falloff_and_cone_are_those_of_the_compiler(gpu: &mut Gpu) {
         }
         let lit = exact.iter().filter(|v| **v > 0.0).count();
         assert!(lit > 10 && lit < 58, "{lit} points are lit");
+    }
+}
+
+fn negative_lights_take_light_away(gpu: &mut Gpu) {
+    let mut scene = floor();
+    let lamp = Vec3::new(0.0, 0.0, 100.0);
+    scene.point(lamp, 5000.0, 4.0);
+    scene.point(lamp, -2000.0, 0.0);
+    let point = on_floor(40.0, 0.0);
+    let to = lamp - point.position;
+    let exact = 3000.0 * to.normalize().z / to.length_squared() / PI;
+    for samples in [0, 8] {
+        let light = direct(gpu, &scene, &[point], samples)[0];
+        assert_near(light.value.x, exact, 1e-4);
+        assert!((light.towards.normalize() - to.normalize()).length() < 0.05);
     }
 }
 
