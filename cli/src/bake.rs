@@ -63,10 +63,10 @@ pub struct BakeArgs {
     #[arg(long)]
     fast: bool,
     /// Gamma of stored light, as the compiler's -gamma; default: 1, or what calibration found
-    #[arg(long, value_parser = positive)]
+    #[arg(long, value_name = "G", value_parser = positive)]
     gamma: Option<f32>,
     /// Divisor of stored light after gamma, as the compiler's -compensate
-    #[arg(long, default_value_t = 1.0, value_parser = positive)]
+    #[arg(long, value_name = "C", default_value_t = 1.0, value_parser = positive)]
     compensate: f32,
     /// Leave the light grid, which lights models, as it is
     #[arg(long)]

@@ -62,11 +62,13 @@ mod tests {
     use super::{command, lab};
 
     /// Options whose description differs between commands, such as a file in one and a folder in another.
-    const DESCRIBED_APART: [&str; 12] = [
+    const DESCRIBED_APART: [&str; 14] = [
         "cache",
         "calibrate",
+        "compensate",
         "device",
         "frames",
+        "gamma",
         "json",
         "look",
         "made",
