@@ -15,7 +15,8 @@ fn game() -> Registration {
         ("t/wall.tga", PIXEL),
         (
             "scripts/t.shader",
-            b"t/nomarks\n{\nsurfaceparm nomarks\n{\nmap t/wall.tga\n}\n}\nt/mist\n{\nsurfaceparm fog\nfogParms ( 0.5 0.25 1 ) 300\n}\n\
+            b"t/nomarks\n{\nsurfaceparm nomarks\n{\nmap t/wall.tga\n}\n}\nt/lit\n{\n{\nmap $lightmap\n}\n{\nmap t/wall.tga\n\
+              blendFunc filter\n}\n}\nt/mist\n{\nsurfaceparm fog\nfogParms ( 0.5 0.25 1 ) 300\n}\n\
               t/murk\n{\nsurfaceparm water\nsurfaceparm trans\nfogParms ( 0.2 0.3 0.3 ) 1024\n\
               {\nmap $whiteimage\nblendFunc filter\nrgbGen const ( 1 0.5 0.25 )\n}\n}\n",
         ),
@@ -325,6 +326,31 @@ fn the_map_can_remap_materials() {
     let world = game.build(map.build());
     let drawn = game.materials.resolve(world.surfaces[0].material);
     assert_eq!(game.materials.get(drawn).name, "t/nomarks");
+}
+
+#[test]
+fn lightmap_stages_are_white_only_in_maps_with_lightmaps() {
+    for has_lightmaps in [false, true] {
+        let mut game = game();
+        let mut map = MapBuilder::new();
+        let wall = map.add_shader("t/lit", 0, 0);
+        map.add_room(wall, Vec3::splat(-128.0), Vec3::splat(128.0));
+        let mut bsp = map.build();
+        // as q3map2 -meta writes them
+        for surface in &mut bsp.surfaces {
+            surface.lightmap = q3bsp::lightmap_index::BY_VERTEX;
+        }
+        bsp.lightmaps.clear();
+        if has_lightmaps {
+            bsp.lightmaps
+                .push(q3bsp::Lightmap(vec![255; 128 * 128 * 3].into()));
+        }
+        let world = game.build(bsp);
+        let material = game.materials.get(world.surfaces[0].material);
+        let flags = game.materials.stages(material)[0].flags;
+        let white = flags & shaders::types::constants::STAGE_NO_LIGHTMAP != 0;
+        assert_eq!(white, has_lightmaps);
+    }
 }
 
 #[test]
