@@ -187,7 +187,14 @@ fn bake_map(args: &BakeArgs, map: &str, output: &Path) -> Result<()> {
         }
     }
     let (baked, pages, stored) = job.round(&mut *gather, &options)?;
-    report(&source, &stored, &baked, (!laid_out).then_some(&pages));
+    let outside = baked.pages_outside(&changed);
+    report(
+        &source,
+        &stored,
+        &baked,
+        outside,
+        (!laid_out).then_some(&pages),
+    );
     println!(
         "{}: {:.1} s, {:.1} s of these for {} by {}",
         output.display(),
@@ -369,7 +376,7 @@ fn write(source: &Source, bsp: &Bsp, beside: &[GameFile], output: &Path) -> Resu
 }
 
 /// Adds the light entities of the `.map` file beside a `.bsp` file: compilers leave them out of the map, and read that file
-/// for light. False without that file, or for a map with light entities of its own.
+/// for light. False without that file. A map with light entities of its own keeps these.
 ///
 /// # Errors
 /// The file cannot be read.
@@ -377,8 +384,11 @@ fn add_lights_of_source(bsp: &mut Bsp, map: &str) -> Result<bool> {
     let source = Path::new(map).with_extension("map");
     let own = bsp.entities();
     let is_light = |entity: &Entity| entity.classname().to_ascii_lowercase().starts_with("light");
-    if !Path::new(map).is_file() || !source.is_file() || own.iter().any(is_light) {
+    if !Path::new(map).is_file() || !source.is_file() {
         return Ok(false);
+    }
+    if own.iter().any(is_light) {
+        return Ok(true);
     }
     let text = std::fs::read(&source).with_context(|| format!("{}", source.display()))?;
     let entities = map_text::parse(&text).with_context(|| format!("{}", source.display()))?;
@@ -450,7 +460,7 @@ fn options(args: &BakeArgs, world: &RelitWorld) -> BakeOptions {
     options
 }
 
-/// Bakes with a bar for each stage.
+/// Bakes with a bar for each stage. Logs the seconds of each.
 fn bake_with_bar(
     world: &RelitWorld,
     gather: &mut dyn Gather,
@@ -458,26 +468,44 @@ fn bake_with_bar(
 ) -> Result<Baked> {
     let style = ProgressStyle::with_template("{msg:16} {bar:40} {percent} %, {eta} left")?;
     let bar = ProgressBar::new(1000).with_style(style);
-    let mut last = None;
+    let mut stages: Vec<(BakeStage, Instant)> = Vec::new();
+    let name = |stage: BakeStage| match stage {
+        BakeStage::Direct => "direct light".to_owned(),
+        BakeStage::Bounce(number) => format!("bounce {number} of {}", options.bounces),
+        BakeStage::Dirt => "dirt".to_owned(),
+        BakeStage::Grid => "light grid".to_owned(),
+    };
+    let begin = Instant::now();
     let baked = bake(world, gather, options, &mut |stage, part| {
-        if last != Some(stage) {
-            last = Some(stage);
+        if stages.last().is_none_or(|(last, _)| *last != stage) {
+            stages.push((stage, Instant::now()));
             bar.reset();
-            bar.set_message(match stage {
-                BakeStage::Direct => "direct light".to_owned(),
-                BakeStage::Bounce(number) => format!("bounce {number} of {}", options.bounces),
-                BakeStage::Dirt => "dirt".to_owned(),
-                BakeStage::Grid => "light grid".to_owned(),
-            });
+            bar.set_message(name(stage));
         }
         bar.set_position((part * 1000.0) as u64);
     });
     bar.finish_and_clear();
-    Ok(baked?)
+    let baked = baked?;
+    let end = Instant::now();
+    let starts = stages.iter().map(|(_, start)| *start);
+    let ends = starts.clone().skip(1).chain([end]);
+    let first = starts.clone().next().unwrap_or(end);
+    let mut seconds = format!("points {:.2} s", (first - begin).as_secs_f64());
+    for ((stage, start), end) in stages.iter().zip(ends) {
+        seconds += &format!(", {} {:.2} s", name(*stage), (end - *start).as_secs_f64());
+    }
+    log::info!("{seconds}");
+    Ok(baked)
 }
 
 /// Prints what was baked; for a map that keeps its coordinates also how far its pages are from those that it had.
-fn report(source: &Source, stored: &Stored, baked: &Baked, pages: Option<&Vec<Page>>) {
+fn report(
+    source: &Source,
+    stored: &Stored,
+    baked: &Baked,
+    outside: usize,
+    pages: Option<&Vec<Page>>,
+) {
     let name = &source.name;
     let lit = |page: &BakedPage| page.owners.iter().filter(|o| **o != u32::MAX).count();
     let texels: usize = baked.pages.iter().map(lit).sum();
@@ -493,7 +521,6 @@ fn report(source: &Source, stored: &Stored, baked: &Baked, pages: Option<&Vec<Pa
             baked.unlit
         );
     }
-    let outside = baked.pages_outside(&source.bsp);
     if outside > 0 {
         log::warn!("{name}: {outside} lightmap images that scripts name stay as they are");
     }
