@@ -246,7 +246,7 @@ impl RelitWorld {
             color_exponent,
             stored_gamma: 1.0,
             light_cutoff: 0.0,
-            cutoff_of_points: false,
+            has_compiled_lights: false,
             exposure: None,
             overbright_shift: options.overbright_shift,
             bsp,

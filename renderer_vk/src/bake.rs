@@ -137,7 +137,7 @@ impl GpuGather {
             points: &world.point_lights,
             suns: &world.suns,
             light_cutoff: world.light_cutoff,
-            cutoff_of_points: world.cutoff_of_points,
+            cutoff_of_points: world.has_compiled_lights,
             bsp: Some(&world.bsp),
             ..MapLightSource::empty(&world.light_lists)
         };

@@ -219,6 +219,12 @@ fn bounce(
         .map(|&i| item_or(&targets.points, i))
         .collect();
     let mut last = places.clone();
+    if world.has_compiled_lights {
+        // q3map2 reflects the ambient term once
+        for light in &mut last.all {
+            light.value += world.ambient;
+        }
+    }
     for number in 1..=options.bounces {
         last.fill(targets);
         let light: Vec<Vec3> = last.all.iter().map(|light| light.value).collect();

@@ -160,7 +160,7 @@ impl Rays<'_> {
             }
         }
         if world.light_cutoff > 0.0 {
-            cut_off(&mut all, world.light_cutoff, world.cutoff_of_points);
+            cut_off(&mut all, world.light_cutoff, world.has_compiled_lights);
         }
         let whole: f32 = all.iter().map(|(_, light)| light.size).sum();
         let mut sizes: Vec<f32> = all.iter().map(|(_, light)| light.size).collect();
@@ -193,6 +193,14 @@ impl Rays<'_> {
         let above =
             |to: Vec3| point.normal == Vec3::ZERO || point.normal.dot(to - point.position) > 0.0;
         let wide = light.area() > WIDE * middle.distance_squared(point.position);
+        if samples == 0 && self.world.has_compiled_lights {
+            let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+            // q3map2 moves it off the surface
+            let middle = (low + high) * 0.5 + light.normal();
+            let open =
+                above(middle) && !self.occluders.blocked_hinted(point.position, middle, hint);
+            return (if open { 1.0 } else { 0.0 }, towards);
+        }
         let rays = match (samples, wide) {
             (0, false) if above(middle) => {
                 let stopped = self.occluders.blocked_hinted(point.position, middle, hint);

@@ -8,8 +8,9 @@
 //!   part that `q3map_backsplash` gives (5 % by default);
 //! * surfaces with `deformVertexes autosprite` are one point light;
 //! * a sky light is a set of suns, which are closer to each other near the zenith;
+//! * light passes `surfaceparm trans` without `alphashadow`, liquids among them;
 //! * points have no extent, and light of less than one stored step is left out ([`RelitWorld::light_cutoff`]), of
-//!   points alone ([`RelitWorld::cutoff_of_points`]).
+//!   points alone ([`RelitWorld::has_compiled_lights`]).
 //!
 //! Source: q3map2 2.5.17n, by comparison with the light that it stores in maps made for it (lab/notes/bake.md).
 
@@ -20,8 +21,9 @@ use super::{
     PointLight, SunLight, TriangleLight, build_lists, raise, surfaces,
 };
 use crate::files::GameFiles;
-use crate::world::{NO_LIGHT, RelitWorld};
+use crate::world::{NO_LIGHT, RelitWorld, WorldMaterial};
 use glam::Vec3;
+use q3bsp::{content_flags, surface_flags};
 use shaderscript::Deform;
 use support::Aabb;
 
@@ -33,6 +35,15 @@ const SPLASH: f32 = 7.0;
 
 /// Default back splash: per cent, and distance from the surface, id units.
 const USUAL_SPLASH: (f32, f32) = (5.0, 23.0);
+
+/// Default of `q3map_lightSubdivide`, id units.
+const USUAL_SUBDIVISION: f32 = 999.0;
+
+/// Most halvings of a light: for directives that ask for tiny pieces.
+const MOST_HALVINGS: u32 = 12;
+
+/// Smallest area of a piece, square id units.
+const LEAST_AREA: f32 = 1.0 / 64.0;
 
 /// Distance from a brush at which a place counts as inside of it, id units.
 const ROUNDING: f32 = 0.125;
@@ -53,13 +64,13 @@ impl RelitWorld {
         }
         self.suns = suns;
         self.triangle_lights.fill(NO_LIGHT);
+        surfaces::add_triangle_lights(self);
+        self.lights = (self.lights.iter())
+            .flat_map(|light| pieces(self, light))
+            .collect();
+        self.triangle_lights.fill(NO_LIGHT);
         for surface in &mut self.surfaces {
             (surface.first_light, surface.num_lights) = (0, 0);
-        }
-        surfaces::add_triangle_lights(self);
-        for light in &mut self.lights {
-            // it shines from where the sky's surface is
-            light.is_sky = false;
         }
         self.lights.extend(splashes(self));
         self.ambient = ambient_alone(&entities);
@@ -72,7 +83,7 @@ impl RelitWorld {
                 false => raise(*strength, self.color_exponent),
             };
         }
-        (self.light_cutoff, self.cutoff_of_points) = (STEP, true);
+        (self.light_cutoff, self.has_compiled_lights) = (STEP, true);
         self.report.fallback = false;
         self.report.triangle_lights = self.lights.len();
         self.report.point_lights = self.point_lights.len();
@@ -90,6 +101,10 @@ impl RelitWorld {
         let Some(material) = self.materials.get_mut(index) else {
             return Vec::new();
         };
+        if is_passed(material) {
+            material.class.passed = true;
+            material.holes = None;
+        }
         let definition = material.resolved.definition().clone();
         let light = &definition.light;
         let used = |world: &RelitWorld| {
@@ -167,6 +182,58 @@ impl RelitWorld {
     }
 }
 
+/// The pieces that q3map2 makes of a light: halves at the middle of its bounds, across x, y, z, until no side exceeds
+/// `q3map_lightSubdivide`.
+fn pieces(world: &RelitWorld, light: &TriangleLight) -> Vec<TriangleLight> {
+    let surface = world.surfaces.get(light.surface as usize);
+    let material = surface.and_then(|surface| world.material_of(surface));
+    let most = material.and_then(|m| m.resolved.definition().light.light_subdivide);
+    let most = most.filter(|most| *most > 0.0).unwrap_or(USUAL_SUBDIVISION);
+    let mut whole = vec![(light.vertices.to_vec(), 0)];
+    let mut made = Vec::new();
+    while let Some((polygon, halvings)) = whole.pop() {
+        let bounds = Aabb::of(polygon.iter().copied());
+        let size = bounds.size().to_array();
+        let across = (0..3).find(|&axis| size[axis] > most);
+        if let Some(axis) = across.filter(|_| halvings < MOST_HALVINGS) {
+            for side in [1.0, -1.0] {
+                let part = half(&polygon, axis, bounds.centre()[axis], side);
+                whole.push((part, halvings + 1));
+            }
+            continue;
+        }
+        let corners = polygon.windows(2).skip(1).map(|pair| match pair {
+            &[b, c] => [polygon.first().copied().unwrap_or(b), b, c],
+            _ => [Vec3::ZERO; 3],
+        });
+        made.extend(corners.map(|vertices| TriangleLight {
+            vertices,
+            // a piece of a triangle, which shines from where the sky's surface is
+            triangle: u32::MAX,
+            is_sky: false,
+            ..*light
+        }));
+    }
+    made.retain(|piece| piece.area() > LEAST_AREA);
+    made
+}
+
+/// The part of a convex polygon on one side of a plane across an axis.
+fn half(polygon: &[Vec3], axis: usize, middle: f32, side: f32) -> Vec<Vec3> {
+    let next = polygon.iter().cycle().skip(1);
+    let mut kept = Vec::with_capacity(polygon.len() + 1);
+    for (&p, &q) in polygon.iter().zip(next) {
+        let (here, there) = ((p[axis] - middle) * side, (q[axis] - middle) * side);
+        if here >= 0.0 {
+            kept.push(p);
+        }
+        if here * there < 0.0 {
+            kept.push(p + (q - p) * (here / (here - there)));
+        }
+    }
+    kept
+}
+
 /// Back splashes of the surface lights of a world. q3map2 drops lights whose middle lies in solid.
 fn splashes(world: &RelitWorld) -> Vec<TriangleLight> {
     let lamps = world.lights.iter();
@@ -185,10 +252,18 @@ fn splashes(world: &RelitWorld) -> Vec<TriangleLight> {
             vertices: [a, c, b],
             radiance: light.radiance * (SPLASH * percent / 100.0),
             triangle: u32::MAX,
+            two_sided: false,
             ..*light
         })
     };
     lamps.filter_map(of_lamp).collect()
+}
+
+/// Whether q3map2 lets all light through a material: `surfaceparm trans` without `alphashadow`, liquids and fences among
+/// them.
+fn is_passed(material: &WorldMaterial) -> bool {
+    let translucent = material.content_flags & content_flags::TRANSLUCENT != 0;
+    translucent && material.surface_flags & surface_flags::ALPHASHADOW == 0
 }
 
 /// Whether a light's place is outside of solids, or one of the places around it to which q3map2 moves a light.
@@ -201,4 +276,23 @@ fn has_room(world: &RelitWorld, place: Vec3) -> bool {
         rows.flat_map(move |y| MOVES.iter().map(move |z| Vec3::new(*x, *y, *z)))
     });
     moves.any(|by| is_free(place + by))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halves_of_a_polygon_fill_it() {
+        let triangle = [Vec3::ZERO, Vec3::X * 8.0, Vec3::Y * 8.0];
+        let area = |polygon: &[Vec3]| -> f32 {
+            let fan = polygon.windows(2).skip(1);
+            fan.map(|p| (p[0] - polygon[0]).cross(p[1] - polygon[0]).z * 0.5)
+                .sum()
+        };
+        let (right, left) = (half(&triangle, 0, 4.0, 1.0), half(&triangle, 0, 4.0, -1.0));
+        assert_eq!((right.len(), left.len()), (3, 4));
+        assert_eq!((area(&right), area(&left)), (8.0, 24.0));
+        assert!(right.iter().all(|p| p.x >= 4.0) && left.iter().all(|p| p.x <= 4.0));
+    }
 }

@@ -24,7 +24,8 @@ impl SkyBox {
     /// Reads the six images. `None` if one is absent.
     pub fn new(finder: &mut Finder<'_>, outer: &str) -> Option<SkyBox> {
         // from the place in an image, each -1 to 1 from its upper left, to a direction
-        let sides: [(&str, fn(f32, f32) -> Vec3); 6] = [
+        type Direction = fn(f32, f32) -> Vec3;
+        let sides: [(&str, Direction); 6] = [
             ("lf", |u, v| Vec3::new(-1.0, u, -v)),
             ("rt", |u, v| Vec3::new(1.0, -u, -v)),
             ("ft", |u, v| Vec3::new(-u, -1.0, -v)),

@@ -17,6 +17,8 @@ pub struct Lighting {
     of_surfaces: Vec<(u32, u32)>,
     /// Of each material.
     emissions: Vec<Option<Emission>>,
+    /// Whether light passes each material.
+    passed: Vec<bool>,
     point_lights: Vec<PointLight>,
     suns: Vec<SunLight>,
     light_lists: LightLists,
@@ -26,7 +28,7 @@ pub struct Lighting {
     color_exponent: f32,
     stored_gamma: f32,
     light_cutoff: f32,
-    cutoff_of_points: bool,
+    has_compiled_lights: bool,
     exposure: Option<Exposure>,
 }
 
@@ -40,6 +42,7 @@ impl RelitWorld {
                 .map(|s| (s.first_light, s.num_lights))
                 .collect(),
             emissions: self.materials.iter().map(|m| m.emission).collect(),
+            passed: self.materials.iter().map(|m| m.class.passed).collect(),
             point_lights: self.point_lights.clone(),
             suns: self.suns.clone(),
             light_lists: self.light_lists.clone(),
@@ -49,7 +52,7 @@ impl RelitWorld {
             color_exponent: self.color_exponent,
             stored_gamma: self.stored_gamma,
             light_cutoff: self.light_cutoff,
-            cutoff_of_points: self.cutoff_of_points,
+            has_compiled_lights: self.has_compiled_lights,
             exposure: self.exposure,
         }
     }
@@ -64,6 +67,12 @@ impl RelitWorld {
         for (material, emission) in self.materials.iter_mut().zip(lighting.emissions) {
             material.emission = emission;
         }
+        for (material, passed) in self.materials.iter_mut().zip(lighting.passed) {
+            material.class.passed = passed;
+            if passed {
+                material.holes = None;
+            }
+        }
         self.point_lights = lighting.point_lights;
         self.suns = lighting.suns;
         self.light_lists = lighting.light_lists;
@@ -73,7 +82,7 @@ impl RelitWorld {
         self.color_exponent = lighting.color_exponent;
         self.stored_gamma = lighting.stored_gamma;
         self.light_cutoff = lighting.light_cutoff;
-        self.cutoff_of_points = lighting.cutoff_of_points;
+        self.has_compiled_lights = lighting.has_compiled_lights;
         self.exposure = lighting.exposure;
     }
 }

@@ -87,8 +87,9 @@ pub struct RelitWorld {
     /// modes leave out contributions below one step of light. 0: no cutoff. Suns and skies have none. Found by
     /// [calibration](crate::calibrate()).
     pub light_cutoff: f32,
-    /// Whether the light cutoff applies to point lights alone, as in q3map2 without `-fast`.
-    pub cutoff_of_points: bool,
+    /// Whether the lights are [those of a compiler](Self::take_compiled_lights): the cutoff applies to points alone, and a
+    /// single ray to a triangle goes to the middle of its bounds.
+    pub has_compiled_lights: bool,
     /// Exposure at which the world's light on the map's textures has the mean brightness of the engine's picture:
     /// found by [calibration](crate::calibrate()). `None`: see [`display_exposure`](Self::display_exposure).
     pub exposure: Option<Exposure>,

@@ -181,7 +181,7 @@ fn with_lights<T>(
         model_origins: &model_origins,
         ambient: relit.ambient,
         light_cutoff: relit.light_cutoff,
-        cutoff_of_points: relit.cutoff_of_points,
+        cutoff_of_points: relit.has_compiled_lights,
         bsp: Some(&relit.bsp),
         occlusion: Some(&occlusion),
     };
