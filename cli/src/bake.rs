@@ -247,7 +247,7 @@ impl Job<'_> {
         options: &BakeOptions,
     ) -> Result<(Baked, Vec<Page>, Stored)> {
         let Job { source, world, .. } = self;
-        let baked = bake_with_bar(world, gather, options)?;
+        let baked = bake_with_bar(&source.name, world, gather, options)?;
         let encoding = options.encoding;
         let mut map = self.map.clone();
         let mut pages = baked.pages(world, &map, encoding);
@@ -460,8 +460,9 @@ fn options(args: &BakeArgs, world: &RelitWorld) -> BakeOptions {
     options
 }
 
-/// Bakes with a bar for each stage. Logs the seconds of each.
+/// Bakes with a bar for each stage. Prints the seconds of each.
 fn bake_with_bar(
+    map: &str,
     world: &RelitWorld,
     gather: &mut dyn Gather,
     options: &BakeOptions,
@@ -494,7 +495,7 @@ fn bake_with_bar(
     for ((stage, start), end) in stages.iter().zip(ends) {
         seconds += &format!(", {} {:.2} s", name(*stage), (end - *start).as_secs_f64());
     }
-    log::info!("{seconds}");
+    println!("{map}: {seconds}");
     Ok(baked)
 }
 
