@@ -62,15 +62,14 @@ pub(super) fn bake(
     };
     let [nx, ny, _] = layout.counts;
     let count = layout.points();
+    let space = targets::FreeSpace::of(world);
     let free: Vec<Option<Vec3>> = (0..count)
         .map(|i| {
             let at = layout.position(i % nx, i / nx % ny, i / nx / ny);
             let moved = TRIES
                 .iter()
                 .map(|t| at + Vec3::from_array(*t) * layout.size);
-            std::iter::once(at)
-                .chain(moved)
-                .find(|at| targets::is_free(world, *at))
+            std::iter::once(at).chain(moved).find(|at| space.has(*at))
         })
         .collect();
     let everywhere: Vec<Point> = free

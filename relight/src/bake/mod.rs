@@ -24,6 +24,7 @@ mod page;
 mod rays;
 pub mod seams;
 mod smooth;
+mod solids;
 pub mod store;
 mod targets;
 #[cfg(test)]

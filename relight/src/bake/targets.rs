@@ -1,6 +1,7 @@
 //! Where a map stores light, and the points that stand for each place.
 
 use super::coverage::{INSET, PageTriangle, Place, places};
+use super::solids::Solids;
 use super::{LitTriangle, Point};
 use crate::world::{RelitWorld, WorldMaterial, WorldSurface};
 use glam::Vec3;
@@ -92,14 +93,15 @@ impl Targets {
             lit: vec![LitTriangle::Dark; world.indices.len() / 3],
             ..Targets::default()
         };
-        targets.add_pages(world, pattern);
+        let space = FreeSpace::of(world);
+        targets.add_pages(world, &space, pattern);
         targets.texels = targets.places;
-        targets.add_vertices(world);
+        targets.add_vertices(world, &space);
         targets.places += world.vertices.len();
         targets
     }
 
-    fn add_pages(&mut self, world: &RelitWorld, pattern: u32) {
+    fn add_pages(&mut self, world: &RelitWorld, space: &FreeSpace<'_>, pattern: u32) {
         let count = world.bsp.lightmaps.len() + world.pages.len();
         let mut of_page: Vec<Vec<(u32, PageTriangle)>> = vec![Vec::new(); count];
         let mut sides = vec![0; count];
@@ -136,7 +138,7 @@ impl Targets {
         }
         let found = parallel::map(&of_page, |page, triangles| {
             let places = places(slice::item(&sides, page), pattern, triangles);
-            let free = |place: &Place| point(world, place);
+            let free = |place: &Place| space.point(place);
             let points: Vec<Option<Point>> = places.iter().map(free).collect();
             (places, points)
         });
@@ -167,7 +169,7 @@ impl Targets {
         }
     }
 
-    fn add_vertices(&mut self, world: &RelitWorld) {
+    fn add_vertices(&mut self, world: &RelitWorld, space: &FreeSpace<'_>) {
         let base = self.places as u32;
         let mut all = Vec::new();
         for (index, surface) in (0u32..).zip(&world.surfaces) {
@@ -210,7 +212,7 @@ impl Targets {
                 }
             }
         }
-        let points = parallel::map(&all, |_, (place, ..)| point(world, place));
+        let points = parallel::map(&all, |_, (place, ..)| space.point(place));
         for ((place, vertex, drawn), point) in all.into_iter().zip(points) {
             let start = self.points.len() as u32;
             self.points.extend(point);
@@ -241,32 +243,51 @@ fn ends(world: &RelitWorld, surface: &WorldSurface) -> Vec<[bool; 3]> {
     triangles.iter().map(ends).collect()
 }
 
-/// The point of a place: above its surface, moved towards the middle of its triangle if that lies in solid. `None` if none of
-/// these is free.
-fn point(world: &RelitWorld, place: &Place) -> Option<Point> {
-    let surface = world.surfaces.get(place.surface as usize)?;
-    let model = world.models.get(surface.model as usize);
-    let origin = model.map_or(Vec3::ZERO, |m| m.origin);
-    let normal = place.normal;
-    let lift = origin + normal * LIFT;
-    let to_middle = place.middle - place.position;
-    let moved = |step: f32| place.position + to_middle.clamp_length_max(step);
-    let places = std::iter::once(place.position).chain(MOVES.map(moved));
-    let mut points = places.map(|on| Point {
-        position: on + lift,
-        normal,
-    });
-    match surface.model {
-        0 => points.find(|point| is_free(world, point.position)),
-        // the leafs of the map say nothing about brush models
-        _ => points.find(|point| point.position.is_finite()),
-    }
+/// Space of a world in which points may lie.
+pub(super) struct FreeSpace<'a> {
+    world: &'a RelitWorld,
+    solids: Solids<'a>,
+    /// Whether the map has a tree that separates space from solid.
+    has_leafs: bool,
 }
 
-/// Whether a position is inside of the map and of nothing solid.
-pub(super) fn is_free(world: &RelitWorld, position: Vec3) -> bool {
-    let leafs = world.bsp.visibility.is_some() || world.bsp.leafs.len() > 1;
-    position.is_finite()
-        && (!leafs || world.bsp.cluster_at(position) >= 0)
-        && !world.bsp.is_in_drawn_brush(position, INSIDE)
+impl<'a> FreeSpace<'a> {
+    /// That of a world.
+    pub fn of(world: &'a RelitWorld) -> FreeSpace<'a> {
+        FreeSpace {
+            world,
+            solids: Solids::of(&world.bsp),
+            has_leafs: world.bsp.visibility.is_some() || world.bsp.leafs.len() > 1,
+        }
+    }
+
+    /// Whether a position is inside of the map and of nothing solid.
+    pub fn has(&self, position: Vec3) -> bool {
+        position.is_finite()
+            && (!self.has_leafs || self.world.bsp.cluster_at(position) >= 0)
+            && !self.solids.hold(position, INSIDE)
+    }
+
+    /// The point of a place: above its surface, moved towards the middle of its triangle if that lies in solid. `None` if
+    /// none of these is free.
+    fn point(&self, place: &Place) -> Option<Point> {
+        let world = self.world;
+        let surface = world.surfaces.get(place.surface as usize)?;
+        let model = world.models.get(surface.model as usize);
+        let origin = model.map_or(Vec3::ZERO, |m| m.origin);
+        let normal = place.normal;
+        let lift = origin + normal * LIFT;
+        let to_middle = place.middle - place.position;
+        let moved = |step: f32| place.position + to_middle.clamp_length_max(step);
+        let places = std::iter::once(place.position).chain(MOVES.map(moved));
+        let mut points = places.map(|on| Point {
+            position: on + lift,
+            normal,
+        });
+        match surface.model {
+            0 => points.find(|point| self.has(point.position)),
+            // the leafs of the map say nothing about brush models
+            _ => points.find(|point| point.position.is_finite()),
+        }
+    }
 }
