@@ -27,6 +27,7 @@ fn listed(program: &str) -> Vec<String> {
 #[test]
 fn help_lists_the_commands_of_users_and_those_of_the_lab_apart() {
     let users = [
+        "bake",
         "calibration",
         "cameras",
         "compare",
@@ -214,4 +215,56 @@ fn samples_are_written_as_packs_and_never_over_a_file() {
         assert!(!refused.stderr.is_empty());
     }
     assert_eq!(std::fs::read(&pack).unwrap(), bytes);
+}
+
+#[test]
+fn a_bake_writes_a_whole_map_or_leaves_the_file_that_is_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (pack, baked, broken) = (path("hall.pk3"), path("hall.bsp"), path("broken.bsp"));
+    assert!(
+        output(RELIGHT, &["sample", "hall", "-o", &pack])
+            .status
+            .success()
+    );
+    let bake = |map: &str, out: &str, more: &[&str]| {
+        let usual = ["bake", map, "-o", out, "--game", &pack, "--device", "cpu"];
+        output(RELIGHT, &[&usual[..], more].concat())
+    };
+    let rough = ["--fast", "--no-calibration", "--preview"];
+    let done = bake(&pack, &baked, &rough);
+    assert!(done.status.success(), "{done:?}");
+    let text = String::from_utf8_lossy(&done.stdout);
+    assert!(
+        text.contains("0 of 1 bounces") && text.contains("direct light"),
+        "{text}"
+    );
+    let bytes = std::fs::read(&baked).unwrap();
+    let bsp = q3bsp::Bsp::parse(&bytes).unwrap();
+    assert!(
+        bsp.lightmaps
+            .iter()
+            .any(|page| page.0.iter().any(|byte| *byte > 0))
+    );
+
+    let fine = path("z_hall_relit.pk3");
+    let done = bake(
+        &pack,
+        &fine,
+        &["--fast", "--no-calibration", "--texels", "2", "--external"],
+    );
+    assert!(done.status.success(), "{done:?}");
+    let shown = output(RELIGHT, &["info", &fine, "--game", &pack]);
+    assert!(shown.status.success(), "{shown:?}");
+
+    std::fs::write(&broken, b"IBSP").unwrap();
+    let refused = bake(&broken, &baked, &rough);
+    assert!(!refused.status.success());
+    assert!(
+        String::from_utf8_lossy(&refused.stderr).contains("broken.bsp"),
+        "{refused:?}"
+    );
+    assert_eq!(std::fs::read(&baked).unwrap(), bytes);
+    let left = std::fs::read_dir(folder.path()).unwrap().count();
+    assert_eq!(left, 4, "a temporary file is left");
 }
