@@ -146,7 +146,7 @@ mod tests {
         assert!(looks(&mut file, 1).is_empty());
         assert_eq!(looks(&mut file, 3), [Ok("One.".to_owned())]);
         // written in pieces: complete at last
-        std::fs::write(&path, "Two, thr").unwrap();
+        std::fs::write(&path, "Two, ").unwrap();
         assert!(looks(&mut file, 4).is_empty());
         std::fs::write(&path, "Two, three.").unwrap();
         assert_eq!(looks(&mut file, 3), [Ok("Two, three.".to_owned())]);
