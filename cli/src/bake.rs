@@ -315,9 +315,16 @@ fn lay_out(args: &BakeArgs, source: &Source, bsp: &mut Bsp) -> Result<()> {
     );
     if !laid.coarser.is_empty() {
         log::warn!(
-            "{}: {} charts are larger than a page and have coarser texels",
+            "{}: {} charts are larger than a page and have coarser texels; --external has larger pages",
             source.name,
             laid.coarser.len()
+        );
+    }
+    if !laid.styled.is_empty() && args.external != Some(External::Scripted) {
+        log::warn!(
+            "{}: {} surfaces lose the light of their light styles; --external leaves their stages out",
+            source.name,
+            laid.styled.len()
         );
     }
     Ok(())
