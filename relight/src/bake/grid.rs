@@ -12,8 +12,8 @@ use glam::Vec3;
 use q3bsp::GridPoint;
 use std::f32::consts::TAU;
 
-/// Most points that a grid may have that a map lacks: 64 MiB.
-const MOST: usize = 1 << 23;
+/// Most points of a grid that a map lacks: what compilers allow.
+const MOST: usize = 1 << 20;
 
 /// A point inside of a wall.
 const EMPTY: GridPoint = GridPoint {

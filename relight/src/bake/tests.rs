@@ -9,6 +9,7 @@ use crate::{Options, calibrate::CalibrationOptions};
 use glam::Vec2;
 use q3bsp::Bsp;
 use q3bsp::builder::MapBuilder;
+use support::random::Random;
 
 const SCRIPT: &str = "
 t/wall
@@ -426,4 +427,70 @@ fn lights_that_calibration_found_give_the_stored_light_back() {
     differences.sort_by(f32::total_cmp);
     let median = differences[differences.len() / 2];
     assert!(median < 2.0, "{median}");
+}
+
+#[test]
+fn damaged_maps_do_no_harm() {
+    let whole = room(&[&POINT], |map| {
+        let lamp = map.add_shader("t/lamp", 0, 1);
+        map.add_quad(
+            lamp,
+            [
+                Vec3::new(0.0, 0.0, 50.0),
+                Vec3::new(0.0, 64.0, 50.0),
+                Vec3::new(64.0, 64.0, 50.0),
+                Vec3::new(64.0, 0.0, 50.0),
+            ],
+        );
+    })
+    .write();
+    let strange = [
+        f32::NAN.to_bits(),
+        f32::INFINITY.to_bits(),
+        1.0e30f32.to_bits(),
+        (-1.0e-30f32).to_bits(),
+        0,
+        1,
+        u32::MAX,
+        i32::MAX as u32,
+        0x8000_0000,
+    ];
+    // pages have no structure to damage
+    let structure = whole.len() - 6 * 128 * 128 * 3;
+    let mut random = Random::new(11);
+    let mut baked_maps = 0;
+    for _ in 0..24 {
+        let mut bytes = whole.clone();
+        for _ in 0..6 {
+            // half of the damage in the vertices and surfaces at the end
+            let at = 144 + random.below((bytes.len() - 148) / 4) * 4;
+            let at = if random.uniform() < 0.5 {
+                at % structure.max(152)
+            } else {
+                at
+            };
+            let word = strange[random.below(strange.len())];
+            if let Some(slot) = bytes.get_mut(at..at + 4) {
+                slot.copy_from_slice(&word.to_le_bytes());
+            }
+        }
+        let Ok(bsp) = Bsp::parse(&bytes) else {
+            continue;
+        };
+        let world = world(&bsp);
+        let options = BakeOptions {
+            bounces: 1,
+            rays: 1,
+            ..plain(&world)
+        };
+        let light = baked(&world, &options);
+        let mut after = world.bsp.clone();
+        let pages = light.pages(&world, &after, options.encoding);
+        light.store_beside_pages(&world, &mut after, options.encoding);
+        if internal(&mut after, &pages).is_ok() {
+            Bsp::parse(&after.write()).unwrap();
+            baked_maps += 1;
+        }
+    }
+    assert!(baked_maps > 8, "{baked_maps}");
 }
