@@ -43,6 +43,13 @@ pub struct GpuGather {
     device: Device,
 }
 
+/// Whether light passes a surface in the world's own opinion, which may be that of a map compiler.
+fn is_passed(world: &RelitWorld, surface: u32) -> bool {
+    let surface = world.surfaces.get(surface as usize);
+    let material = surface.and_then(|surface| world.material_of(surface));
+    material.is_some_and(|m| m.class.passed && m.holes.is_none() && !m.is_sky())
+}
+
 /// The map's own geometry; brush models cast no shadow, as with map compilers.
 fn static_scene<'a>(
     world: &'a RelitWorld,
@@ -56,7 +63,7 @@ fn static_scene<'a>(
         mapped_address: 0,
         indices: &world.indices,
         surfaces: surfaces
-            .filter(|(s, _)| s.index_count > 0 && s.model == 0)
+            .filter(|(s, number)| s.index_count > 0 && s.model == 0 && !is_passed(world, *number))
             .map(|(s, number)| StaticSurface {
                 first_index: s.first_index,
                 index_count: s.index_count,

@@ -108,7 +108,11 @@ void see_point(BakePointLight light, BakePoint point, inout Source s) {
     if (!(away > 0.0)) return;
     float cosine = incidence(point, s.a / away), distance = max(away, NEAREST);
     float part = cosine / (distance * distance);
-    if (light.reach > 0.0) part = 8.0 / (light.reach * light.reach) * max(cosine - distance / light.reach, 0.0);
+    if (light.reach != 0.0) {
+        // negative: the light does not depend on its angle of incidence
+        float facing = light.reach < 0.0 ? float(cosine > 0.0) : cosine;
+        part = 8.0 / (light.reach * light.reach) * max(facing - distance / abs(light.reach), 0.0);
+    }
     if (light.tan_half_angle >= 0.0) {
         float along = -dot(s.a, light.axis);
         float aside = sqrt(max(away * away - along * along, 0.0));

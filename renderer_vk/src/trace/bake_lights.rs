@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use glam::Vec3;
 use q3bsp::{Bsp, Child};
 use relight::bake::{LitSurfaces, LitTriangle};
-use relight::light::{LightRef, PointLight};
+use relight::light::{Falloff, LightRef, PointLight};
 use shaders::trace_types as t;
 use shaders::trace_types::constants as c;
 
@@ -37,7 +37,11 @@ fn point_light(light: &PointLight, end: f32) -> t::BakePointLight {
         origin: light.origin,
         radius: light.radius.max(0.0),
         intensity: light.intensity / PI,
-        reach: light.falloff.reach().unwrap_or(0.0),
+        reach: match light.falloff {
+            Falloff::InverseSquare => 0.0,
+            Falloff::Linear { reach } => reach,
+            Falloff::LinearAtAnyAngle { reach } => -reach,
+        },
         axis,
         tan_half_angle,
         end,

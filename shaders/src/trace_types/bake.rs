@@ -43,7 +43,7 @@ pub struct BakePointLight {
     pub radius: f32,
     /// Radiant intensity over pi.
     pub intensity: Vec3,
-    /// Distance at which linear falloff ends; 0: inverse-square falloff.
+    /// Distance at which linear falloff ends, negative if the angle of incidence does not count; 0: inverse-square falloff.
     pub reach: f32,
     /// Direction of a spot, of length 1.
     pub axis: Vec3,

@@ -222,8 +222,10 @@ fn falloff_and_cone_are_those_of_the_compiler(gpu: &mut Gpu) {
         direction: Vec3::new(0.3, 0.1, -1.0).normalize(),
         tan_half_angle: 0.6,
     };
+    let at_any_angle = Falloff::LinearAtAnyAngle { reach: 300.0 };
     for (falloff, spot) in [
         (linear, None),
+        (at_any_angle, None),
         (Falloff::InverseSquare, Some(spot)),
         (linear, Some(spot)),
     ] {
