@@ -167,9 +167,9 @@ pub fn bake(
     })?;
     let mut places = Places::of(&targets, |points| mean(part(&direct, points)));
     bounce(world, &targets, &mut places, gather, options, progress)?;
-    for light in &mut places.all {
-        light.value += world.ambient;
-    }
+    places
+        .lights_mut()
+        .for_each(|light| light.value += world.ambient);
     if let Some(dirt) = options.dirt {
         progress(BakeStage::Dirt, 0.0);
         let occluders = Occluders::of_world(world);
@@ -222,9 +222,8 @@ fn bounce(
     let mut last = places.clone();
     if world.has_compiled_lights {
         // q3map2 reflects the ambient term once
-        for light in &mut last.all {
-            light.value += world.ambient;
-        }
+        last.lights_mut()
+            .for_each(|light| light.value += world.ambient);
     }
     for number in 1..=options.bounces {
         last.fill(targets);
@@ -243,7 +242,7 @@ fn bounce(
             false => found.next().unwrap_or_default(),
         });
         last.smooth(world, targets);
-        for (sum, more) in places.all.iter_mut().zip(&last.all) {
+        for (sum, more) in places.lights_mut().zip(last.lights_mut()) {
             *sum += *more;
         }
     }
@@ -319,6 +318,11 @@ impl Places {
         places
     }
 
+    /// The light of all places, and of the vertices that store light.
+    fn lights_mut(&mut self) -> impl Iterator<Item = &mut Light> {
+        self.all.iter_mut().chain(&mut self.vertices)
+    }
+
     /// Sets the light of a drawn vertex.
     fn spread_vertex(&mut self, targets: &Targets, vertex: &targets::Vertex, light: Light) {
         let drawn = vertex.drawn.map(|drawn| targets.texels + drawn as usize);
@@ -368,16 +372,14 @@ impl Places {
         let firsts = Places::first_points(targets);
         let factors = parallel::map(&firsts, |_, &i| factor(&item_or(&targets.points, i)));
         let mut factors = factors.into_iter();
-        let of_places = Places::of(targets, |points| match points.is_empty() {
+        let mut of_places = Places::of(targets, |points| match points.is_empty() {
             true => Light::default(),
             false => Light {
                 value: Vec3::splat(factors.next().unwrap_or(1.0)),
                 towards: Vec3::ZERO,
             },
         });
-        let all = self.all.iter_mut().zip(&of_places.all);
-        let vertices = self.vertices.iter_mut().zip(&of_places.vertices);
-        for (light, factor) in all.chain(vertices) {
+        for (light, factor) in self.lights_mut().zip(of_places.lights_mut()) {
             *light = *light * factor.value.x;
         }
     }

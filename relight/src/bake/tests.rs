@@ -318,6 +318,40 @@ fn bounces_sum_to_the_series_of_a_closed_room() {
 }
 
 #[test]
+fn vertices_get_all_the_light_that_texels_get() {
+    let corners = [(-64.0, -64.0), (-64.0, 64.0), (64.0, 64.0), (64.0, -64.0)];
+    let bsp = room(&[&POINT], |map| {
+        map.set_world_key("ambient", "20");
+        let wall = map.add_shader("t/wall", 0, 1);
+        let mut quad = |z: f32| map.add_quad(wall, corners.map(|(x, y)| Vec3::new(x, y, z)));
+        let (by_texel, by_vertex) = (quad(60.0), quad(60.2));
+        let page = map.add_lightmap([0; 3]);
+        map.set_lightmap(by_texel, page);
+        map.set_lightmap(by_vertex, q3bsp::lightmap_index::BY_VERTEX);
+    });
+    let world = world(&bsp);
+    let options = BakeOptions {
+        bounces: 2,
+        rays: 36,
+        dirt: Some(Dirt::DEFAULT),
+        reflectance: Reflectance::Albedo,
+        ..plain(&world)
+    };
+    let baked = baked(&world, &options);
+    let by_texel = baked.pages.iter().find(|page| page.number == 6).unwrap();
+    // the page covers the quad: its corner texels lie at the corners
+    let side = by_texel.side;
+    let texels =
+        [0, side - 1, side * (side - 1), side * side - 1].map(|at| by_texel.light[at].value);
+    assert_eq!(baked.vertices.len(), 4);
+    for (_, _, light) in &baked.vertices {
+        let error = |texel: &Vec3| (*light / *texel - 1.0).abs().max_element();
+        let least = texels.iter().map(error).fold(f32::INFINITY, f32::min);
+        assert!(least < 0.12, "{light}: {texels:?}");
+    }
+}
+
+#[test]
 fn the_light_grid_has_the_direction_and_the_light() {
     let mut map = MapBuilder::new();
     let wall = map.add_shader("t/wall", 0, 1);
