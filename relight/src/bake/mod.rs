@@ -6,7 +6,8 @@
 //! 3. Bounces: each gathers at one point of every place the light that surfaces reflect, lit by the bounce before
 //!    ([`LitSurfaces`]). The reflected light of a texel is smoothed over its neighbours on the same surface.
 //! 4. `grid` computes the light grid.
-//! 5. [`Baked::store`] encodes the light ([`Encoding`]) and changes the map's lumps of light, nothing else.
+//! 5. [`Baked::pages`] and [`Baked::store_beside_pages`] encode the light ([`Encoding`]) for the map's lumps of light; nothing
+//!    else changes.
 //!
 //! Light is irradiance over π: the outgoing radiance of a white surface, in display units ([`emitters`](crate::emitters)).
 //!
