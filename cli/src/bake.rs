@@ -7,7 +7,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use q3bsp::{Bsp, Entity, map_text};
+use q3bsp::Bsp;
 use relight::bake::layout::{self, LayoutOptions, LightmapUse, PageSides};
 use relight::bake::store::deluxe::{DirectionSpace, interleave};
 use relight::bake::store::external::{numbered, scripted};
@@ -29,6 +29,7 @@ use crate::game::Maps;
 use crate::numbers::positive;
 use crate::scripts::load_scripts;
 use crate::view::open;
+use crate::watched::SourceText;
 
 /// Compute the light of maps, and write it into them
 ///
@@ -162,6 +163,17 @@ fn bake_map(args: &BakeArgs, map: &str, output: &Path) -> Result<()> {
         lay_out(args, &source, &mut changed)?;
         world = with_layout(&source, &changed, world);
     }
+    let shared = if laid_out {
+        0
+    } else {
+        layout::owners(&world).shared
+    };
+    if shared > 0 {
+        log::warn!(
+            "{}: {shared} texels are shown at several places and get the mean of their light; --texels 1 gives each place its own",
+            source.name
+        );
+    }
     let loaded = begin.elapsed();
     let mut gather = bake_device::gather(args.device.as_deref(), &source.files, &world)?;
     let job = Job {
@@ -240,6 +252,14 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
+    /// Game path of the map that is written: a pack replaces the map, and a `.bsp` file has the name of the output.
+    fn name(&self) -> String {
+        match self.output.file_stem() {
+            Some(stem) if !is_pack(self.output) => format!("maps/{}.bsp", stem.to_string_lossy()),
+            _ => self.source.name.clone(),
+        }
+    }
+
     /// Bakes with these options, and writes the output.
     fn round(
         &self,
@@ -274,10 +294,10 @@ impl Job<'_> {
                 store::internal(&mut map, &all)?;
                 Vec::new()
             }
-            Some(External::Numbered) => numbered(&mut map, &source.name, &all)?,
+            Some(External::Numbered) => numbered(&mut map, &self.name(), &all)?,
             Some(External::Scripted) => {
                 let (files, materials) = (&*source.files, &source.materials);
-                scripted(&mut map, &source.name, &all, files, materials)?
+                scripted(&mut map, &self.name(), &all, files, materials)?
             }
         };
         write(source, &map, &beside, self.output)?;
@@ -341,18 +361,23 @@ fn with_layout(source: &Source, bsp: &Bsp, before: RelitWorld) -> RelitWorld {
     let (files, materials) = (&*source.files, &source.materials);
     let mut world = RelitWorld::from_bsp(files, materials, &source.name, bsp.clone(), options);
     world.measure_materials(files);
+    // materials by hand; the lights are replaced
+    world.read_by_hand(files);
     world.set_lighting(before.lighting());
     world
+}
+
+/// Whether an output is a pack.
+fn is_pack(output: &Path) -> bool {
+    let extension = output.extension();
+    extension.is_some_and(|e| e.eq_ignore_ascii_case("pk3"))
 }
 
 /// Writes a map with the files beside it, or a pack of them.
 fn write(source: &Source, bsp: &Bsp, beside: &[GameFile], output: &Path) -> Result<()> {
     let mut out = Output::new(output);
     let bytes = bsp.write();
-    let is_pack = output
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("pk3"));
-    if is_pack {
+    if is_pack(output) {
         let aas = Path::new(&source.name).with_extension("aas");
         let aas = source.files.read(&aas.to_string_lossy())?;
         let pack = relit_pack(RelitMap {
@@ -368,11 +393,16 @@ fn write(source: &Source, bsp: &Bsp, beside: &[GameFile], output: &Path) -> Resu
         }
         out.write_main(&pack.bytes)?;
     } else {
+        let in_maps = output
+            .parent()
+            .and_then(Path::file_name)
+            .is_some_and(|name| name.eq_ignore_ascii_case("maps"));
         for file in beside {
-            // the map lies in the folder `maps` of a game
+            // images lie beside the map, scripts in the folder of the game if the map is in its `maps`
             let name = match file.path.strip_prefix("maps/") {
                 Some(name) => name.to_owned(),
-                None => format!("../{}", file.path),
+                None if in_maps => format!("../{}", file.path),
+                None => file.path.clone(),
             };
             out.write_beside(&name, &file.bytes)?;
         }
@@ -382,41 +412,19 @@ fn write(source: &Source, bsp: &Bsp, beside: &[GameFile], output: &Path) -> Resu
     Ok(())
 }
 
-/// Adds the light entities of the `.map` file beside a `.bsp` file: compilers leave them out of the map, and read that file
-/// for light. False without that file. A map with light entities of its own keeps these.
+/// Gives a map the light entities of the `.map` file beside its `.bsp` file: compilers leave them out of the map, and read
+/// that file for light. False without that file.
 ///
 /// # Errors
 /// The file cannot be read.
 fn add_lights_of_source(bsp: &mut Bsp, map: &str) -> Result<bool> {
     let source = Path::new(map).with_extension("map");
-    let own = bsp.entities();
-    let is_light = |entity: &Entity| entity.classname().to_ascii_lowercase().starts_with("light");
     if !Path::new(map).is_file() || !source.is_file() {
         return Ok(false);
     }
-    if own.iter().any(is_light) {
-        return Ok(true);
-    }
-    let text = std::fs::read(&source).with_context(|| format!("{}", source.display()))?;
-    let entities = map_text::parse(&text).with_context(|| format!("{}", source.display()))?;
-    let mut lights = String::new();
-    let mut count = 0;
-    for entity in entities.iter().map(|e| &e.entity) {
-        // lights point at others
-        if is_light(entity) || entity.get("targetname").is_some() {
-            count += usize::from(is_light(entity));
-            lights.push_str("{\n");
-            for (key, value) in &entity.pairs {
-                lights.push_str(&format!("\"{key}\" \"{value}\"\n"));
-            }
-            lights.push_str("}\n");
-        }
-    }
-    while bsp.entities.last().is_some_and(|byte| *byte == 0) {
-        bsp.entities.pop();
-    }
-    bsp.entities.extend_from_slice(lights.as_bytes());
-    log::info!("{}: {count} light entities", source.display());
+    let name = || source.display().to_string();
+    let text = std::fs::read(&source).with_context(name)?;
+    SourceText::parse(&text).with_context(name)?.light(bsp);
     Ok(true)
 }
 

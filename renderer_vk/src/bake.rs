@@ -17,7 +17,6 @@ use crate::trace::bake::{BakeScene, Baker};
 use crate::trace::geometry::StaticGeometry;
 use crate::trace::input::{StaticScene, StaticSurface};
 use crate::trace::lights::MapLightSource;
-use crate::trace::surroundings::{Surroundings, filter_boxes};
 use crate::trace::tracer::Tracer;
 use crate::world::{Occluding, WorldOptions};
 
@@ -43,7 +42,7 @@ pub struct GpuGather {
     device: Device,
 }
 
-/// Whether light passes a surface in the world's own opinion, which may be that of a map compiler.
+/// Whether the world's materials let light pass through a surface; for compiled lights these follow the compiler's rules.
 fn is_passed(world: &RelitWorld, surface: u32) -> bool {
     let surface = world.surfaces.get(surface as usize);
     let material = surface.and_then(|surface| world.material_of(surface));
@@ -136,9 +135,7 @@ impl GpuGather {
         let scene = static_scene(world, &occluding, vertices.address());
         let tracer = Tracer::of(device.info(), tracer);
         let structures = (tracer, settings.rt_grid_cells);
-        let mut geometry = StaticGeometry::new(device, structures, &scene, &assets)?;
-        let filters = filter_boxes(&occluding.surfaces, &assets);
-        geometry.surroundings = Surroundings::of_boxes(device, filters)?;
+        let geometry = StaticGeometry::new(device, structures, &scene, &assets)?;
         let lights = MapLightSource {
             triangles: &world.lights,
             points: &world.point_lights,

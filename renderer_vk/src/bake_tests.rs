@@ -85,8 +85,7 @@ fn the_gpu_finds_the_light_that_the_cpu_finds() {
     ];
     let full = testkit::is_set("RELIGHT_FULL");
     let tracers = if full { &tracers[..] } else { &tracers[..2] };
-    // am_galmevish: points on lamps, closer to them than a lamp is wide, where the CPU takes the visible part of the area, and
-    // a sun through hellfog, which filters light here
+    // am_galmevish: points on lamps, closer to them than a lamp is wide, where the CPU takes the visible part of the area
     for (map, tracers, bounds) in [
         ("maps/kaos2.bsp", tracers, [0.003, 0.04, 0.01]),
         ("maps/am_galmevish.bsp", &tracers[..1], [0.02, 0.5, 0.08]),

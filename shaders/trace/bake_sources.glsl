@@ -19,7 +19,7 @@ const float SPOT_FADE = 32.0;
 // Least distance at which the light of a point is computed, units: q3map2 avoids spots by it.
 const float NEAREST = 16.0;
 
-// Kinds of what a point sees.
+// Kinds of light sources.
 const uint SEEN_TRIANGLE = 0, SEEN_POINT = 1, SEEN_SUN = 2, SEEN_SKY = 3;
 
 // A light as a point sees it. The vectors are relative to the point.

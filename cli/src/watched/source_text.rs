@@ -1,11 +1,11 @@
-//! A `.map` file: what of it a compiler reads, and what only lights.
+//! A `.map` file: the part on which surfaces depend, and the part that changes the light alone.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use q3bsp::map_text::{self, MapEntity, MapTextError};
 use q3bsp::{Bsp, Entity};
 
-/// Keys of the world that only light.
+/// Keys of the world that change its light alone.
 const LIGHT_KEYS: [&str; 6] = [
     "ambient",
     "_ambient",
@@ -36,7 +36,7 @@ const WITHOUT_SURFACES: [&str; 12] = [
 pub struct SourceText {
     /// The world's keys, then the point entities.
     entities: Vec<Entity>,
-    /// Hash of what the compiler makes surfaces of.
+    /// Hash of the brushes, the patches, and the keys of the world, of brush entities and of models: what surfaces depend on.
     compiled: u64,
 }
 

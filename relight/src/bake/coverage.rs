@@ -190,8 +190,8 @@ fn from_the_middle(side: u32) -> Vec<(u64, Vec2)> {
 
 /// Texels that no surface covers and that filtering may read: filled from covered neighbours, ring by ring.
 ///
-/// `owners`: for each texel the number of what covers it, or `u32::MAX`. A texel takes the mean of those neighbours that
-/// belong to the owner of its nearest covered neighbour, and belongs to it then.
+/// `owners`: for each texel the surface that covers it, or `u32::MAX`. An uncovered texel gets the owner of its first covered
+/// neighbour, and the mean of the neighbours with that owner.
 pub fn fill<T: Copy>(
     side: usize,
     rings: usize,

@@ -57,7 +57,7 @@ pub enum LitTriangle {
     Vertices([u32; 3]),
 }
 
-/// Light on all surfaces, of which they reflect a part.
+/// Light on all surfaces, and their reflectances.
 #[derive(Debug, Clone, Copy)]
 pub struct LitSurfaces<'a> {
     /// For each triangle of [`RelitWorld::indices`](crate::RelitWorld::indices) where its light is.

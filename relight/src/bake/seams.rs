@@ -267,9 +267,7 @@ fn solve(rows: &[Row], start: &[Vec3]) -> Vec<Vec3> {
 mod tests {
     use super::*;
     use crate::bake::layout::{LayoutOptions, LightmapUse, PageSides, make};
-    use crate::files::MemoryFiles;
-    use crate::load::Options;
-    use crate::materials::Materials;
+    use crate::bake::tests::plain_world;
     use q3bsp::builder::MapBuilder;
     use q3bsp::{Bsp, DrawVert};
 
@@ -281,13 +279,7 @@ mod tests {
             ..LayoutOptions::internal(&material)
         };
         make(&mut bsp, &options).unwrap();
-        let files = MemoryFiles::new();
-        let (materials, _) = Materials::load(&files);
-        let options = Options {
-            calibrate: None,
-            ..Options::default()
-        };
-        let world = RelitWorld::from_bsp(&files, &materials, "maps/m.bsp", bsp, options);
+        let world = plain_world(bsp);
         let pages = vec![Page::blank(64); world.bsp.lightmaps.len()];
         (world, pages)
     }

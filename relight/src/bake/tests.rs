@@ -77,6 +77,17 @@ fn world(bsp: &Bsp) -> RelitWorld {
     world
 }
 
+/// The world of a map without scripts.
+pub(super) fn plain_world(bsp: Bsp) -> RelitWorld {
+    let files = MemoryFiles::new();
+    let (materials, _) = Materials::load(&files);
+    let options = Options {
+        calibrate: None,
+        ..Options::default()
+    };
+    RelitWorld::from_bsp(&files, &materials, "maps/m.bsp", bsp, options)
+}
+
 /// Options for one point a texel, one ray to each light and no bounce.
 fn plain(world: &RelitWorld) -> BakeOptions {
     BakeOptions {

@@ -291,15 +291,8 @@ impl Baker {
             samples,
             all,
         };
-        let pace = Pace::new(self.limits);
-        let run = Run::new(
-            &self.device,
-            &mut self.accel,
-            &self.scene,
-            ring,
-            scene,
-            pace,
-        );
+        let structures = (&mut self.accel, &self.scene);
+        let run = Run::new(&self.device, structures, ring, scene, self.limits);
         run.all(&work, &mut self.chunks, points, progress)
     }
 
@@ -326,15 +319,8 @@ impl Baker {
             samples: rays.max(1),
             all: rays.max(1),
         };
-        let pace = Pace::new(self.limits);
-        let run = Run::new(
-            &self.device,
-            &mut self.accel,
-            &self.scene,
-            ring,
-            scene,
-            pace,
-        );
+        let structures = (&mut self.accel, &self.scene);
+        let run = Run::new(&self.device, structures, ring, scene, self.limits);
         run.all(&work, &mut self.chunks, points, progress)
     }
 }
@@ -355,11 +341,10 @@ struct Run<'a> {
 impl<'a> Run<'a> {
     fn new(
         device: &'a Device,
-        accel: &'a mut Accel,
-        view: &'a TracedScene,
+        (accel, view): (&'a mut Accel, &'a TracedScene),
         ring: &'a mut FrameRing,
         scene: BakeScene<'a>,
-        pace: Pace,
+        limits: Limits,
     ) -> Self {
         Self {
             device,
@@ -369,7 +354,7 @@ impl<'a> Run<'a> {
             scene,
             in_flight: VecDeque::new(),
             idle_since: Instant::now(),
-            pace,
+            pace: Pace::new(limits),
         }
     }
 
@@ -486,12 +471,6 @@ impl<'a> Run<'a> {
                 top_level: accel.top.scene,
                 sky_sampler: materials.sky_sampler(),
                 ..t::SceneView::default()
-            },
-            transport: t::TransportView {
-                filters: geometry.surroundings.filters(),
-                // compilers' light passes through; calibration fits lights without filters, too
-                filter_count: 0,
-                ..t::TransportView::default()
             },
             post: t::PostView {
                 image_rays: NO_IMAGE,

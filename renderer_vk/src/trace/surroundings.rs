@@ -6,7 +6,7 @@ use support::Aabb;
 
 use crate::assets::Assets;
 use crate::gpu::{Buffer, BufferUsage, Device, Error};
-use crate::world::{World, WorldSurface};
+use crate::world::World;
 
 /// Maximum number of boxes that a shadow ray is tested against; above it, boxes are merged.
 pub const MAX_BOXES: usize = 16;
@@ -39,7 +39,15 @@ impl Surroundings {
             let drawn = assets.materials.resolve(material);
             assets.materials.get(drawn).dielectric
         };
-        let boxes = filter_boxes(&data.surfaces, assets);
+        let boxes: Vec<Aabb> = data
+            .surfaces
+            .iter()
+            .filter(|s| s.model == 0 && s.index_count > 0 && dielectric(s.material).filters != 0)
+            .map(|s| {
+                let margin = if s.deformed { DEFORMATION } else { 0.0 };
+                s.bounds.grown(Vec3::splat(margin + 1.0))
+            })
+            .collect();
         let liquids = (data.surfaces.iter())
             .map(|s| s.material)
             .collect::<std::collections::BTreeSet<u32>>()
@@ -89,22 +97,6 @@ impl Surroundings {
         let around = |liquid: &&Liquid| !liquid.planes.iter().any(outside);
         (self.liquids.iter().find(around)).map_or(Vec3::ZERO, |l| l.absorption)
     }
-}
-
-/// Boxes around the world's surfaces that filter light.
-pub fn filter_boxes(surfaces: &[WorldSurface], assets: &Assets) -> Vec<Aabb> {
-    let filters = |material: u32| {
-        let drawn = assets.materials.resolve(material);
-        assets.materials.get(drawn).dielectric.filters != 0
-    };
-    surfaces
-        .iter()
-        .filter(|s| s.model == 0 && s.index_count > 0 && filters(s.material))
-        .map(|s| {
-            let margin = if s.deformed { DEFORMATION } else { 0.0 };
-            s.bounds.grown(Vec3::splat(margin + 1.0))
-        })
-        .collect()
 }
 
 /// The world's brushes of a material.

@@ -1,10 +1,8 @@
 //! Layouts of made-up maps, of hostile ones and of installed ones.
 
 use super::*;
-use crate::files::MemoryFiles;
-use crate::load::Options;
+use crate::bake::tests::plain_world;
 use crate::materials::Materials;
-use crate::world::RelitWorld;
 use glam::{Vec2, Vec3};
 use proptest::prelude::*;
 use q3bsp::DrawVert;
@@ -272,13 +270,7 @@ fn present_coordinates_give_the_same_charts_as_their_layout() {
     half_cylinder(&mut map, 64.0, 128.0);
     let mut bsp = unlit(map);
     let report = make(&mut bsp, &LayoutOptions::internal(&plain)).unwrap();
-    let files = MemoryFiles::new();
-    let (materials, _) = Materials::load(&files);
-    let options = Options {
-        calibrate: None,
-        ..Options::default()
-    };
-    let world = RelitWorld::from_bsp(&files, &materials, "maps/m.bsp", bsp, options);
+    let world = plain_world(bsp);
     let found = owners(&world);
     assert_eq!(found.shared, 0);
     let texels = found.pages.iter().zip(&report.owners.pages);
@@ -307,13 +299,7 @@ fn texels_of_two_places_are_counted_as_shared() {
         let light = bsp.vertices[first.first_vert as usize + i].lightmap;
         bsp.vertices[second.first_vert as usize + i].lightmap = light;
     }
-    let files = MemoryFiles::new();
-    let (materials, _) = Materials::load(&files);
-    let options = Options {
-        calibrate: None,
-        ..Options::default()
-    };
-    let world = RelitWorld::from_bsp(&files, &materials, "maps/m.bsp", bsp, options);
+    let world = plain_world(bsp);
     let found = owners(&world);
     assert_eq!(found.shared, 25);
     assert_ne!(found.of_surface[0], found.of_surface[1]);

@@ -222,10 +222,9 @@ fn falloff_and_cone_are_those_of_the_compiler(gpu: &mut Gpu) {
         direction: Vec3::new(0.3, 0.1, -1.0).normalize(),
         tan_half_angle: 0.6,
     };
-    let at_any_angle = Falloff::LinearAtAnyAngle { reach: 300.0 };
     for (falloff, spot) in [
         (linear, None),
-        (at_any_angle, None),
+        (Falloff::LinearAtAnyAngle { reach: 300.0 }, None),
         (Falloff::InverseSquare, Some(spot)),
         (linear, Some(spot)),
     ] {
@@ -266,22 +265,24 @@ fn negative_lights_take_light_away(gpu: &mut Gpu) {
     }
 }
 
+/// A sky without images.
+fn black_sky(scene: &mut Scene) -> u32 {
+    let record = SkyRecord {
+        faces: [c::NO_TEXTURE; 6],
+        cloud_height: 512.0,
+    };
+    scene.sky(&[], record)
+}
+
 fn suns_shine_through_the_sky(gpu: &mut Gpu) {
     let mut scene = floor();
-    let sky = scene.sky(
-        &[],
-        SkyRecord {
-            faces: [c::NO_TEXTURE; 6],
-            cloud_height: 512.0,
-        },
-    );
+    let sky = black_sky(&mut scene);
     scene.quad(ceiling_at(500.0, 2000.0), sky);
     let grey = scene.diffuse(0.5);
     scene.quad(ceiling_at(100.0, 50.0), grey);
     let to_sun = Vec3::new(0.0, 0.6, 0.8);
     scene.sun(to_sun, 3.0, 0.01);
-    // the shadow of the roof lies around y = -75
-    let points = [on_floor(0.0, 200.0), on_floor(0.0, -75.0)];
+    let points = [on_floor(0.0, 200.0), on_floor(0.0, -75.0)]; // the second in the roof's shadow
     for samples in [0, 16] {
         let found = direct(gpu, &scene, &points, samples);
         let exact = 3.0 * 0.8 / PI;
@@ -293,13 +294,7 @@ fn suns_shine_through_the_sky(gpu: &mut Gpu) {
 
 fn a_sky_lights_by_what_is_visible_of_it(gpu: &mut Gpu) {
     let mut scene = floor();
-    let sky = scene.sky(
-        &[],
-        SkyRecord {
-            faces: [c::NO_TEXTURE; 6],
-            cloud_height: 512.0,
-        },
-    );
+    let sky = black_sky(&mut scene);
     let grey = scene.diffuse(0.5);
     // over x > 0 the sky is a light; over x < 0 there is a roof
     let first = scene.indices.len() as u32 / 3;

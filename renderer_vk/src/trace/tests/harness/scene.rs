@@ -404,7 +404,7 @@ impl Scene {
         }
     }
 
-    /// The lights, none of which rays can hit.
+    /// The lights; rays hit none of them.
     pub fn light_source<'a>(&'a self, lists: &'a LightLists) -> MapLightSource<'a> {
         MapLightSource {
             triangles: &self.lights,
