@@ -144,6 +144,10 @@ pub struct MovingCost {
     pub bodies: u64,
     /// Those that were left out.
     pub left_out: u64,
+    /// Instances of top levels.
+    pub instances: u64,
+    /// Those that the CPU wrote: the GPU keeps the others while hits are counted.
+    pub written: u64,
 }
 
 impl MovingCost {
@@ -159,6 +163,8 @@ impl MovingCost {
             unmet: self.unmet - earlier.unmet,
             bodies: self.bodies - earlier.bodies,
             left_out: self.left_out - earlier.left_out,
+            instances: self.instances - earlier.instances,
+            written: self.written - earlier.written,
         }
     }
 
@@ -170,6 +176,8 @@ impl MovingCost {
             parts: self.parts,
             left_out_parts: self.left_out_parts,
             refits: self.refits,
+            instances: self.instances,
+            written: self.written,
             ..feedback
         }
     }
@@ -179,13 +187,15 @@ impl MovingCost {
         #[allow(clippy::cast_precision_loss)] // rounded shares for reports
         let percent = |part: u64, of: u64| part as f64 / of.max(1) as f64 * 100.0;
         format!(
-            "{parts} animated parts in {} frames: {:.1} % met by no ray, {:.1} % refitted, {:.1} % left out; {:.1} % of {} bodies left out",
+            "{parts} animated parts in {} frames: {:.1} % met by no ray, {:.1} % refitted, {:.1} % left out; {:.1} % of {} bodies left out; {:.1} % of {} instances written by the CPU",
             self.frames,
             percent(self.unmet, self.counted),
             percent(self.refits, parts),
             percent(self.left_out_parts, parts),
             percent(self.left_out, self.bodies),
-            self.bodies
+            self.bodies,
+            percent(self.written, self.instances),
+            self.instances
         )
     }
 }

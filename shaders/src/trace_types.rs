@@ -30,7 +30,7 @@ pub use lights::{
 pub use photons::{BodyTriangle, Photon, PhotonCell, PhotonView};
 pub use structures::{
     BvhInstance, BvhNode, BvhTriangle, FilterStep, FirstHitsStep, GeometryRecord, GridRecord,
-    HybridStep, PassStep,
+    HybridStep, ListStep, PassStep,
 };
 pub use surroundings::{
     CutOut, FlareView, FogView, MirrorPlane, PortalRecord, SkyRecord, TransportView,

@@ -48,6 +48,11 @@ impl Instance {
         }
     }
 
+    /// The words of Vulkan's instance structure.
+    pub fn words(&self) -> [u32; 16] {
+        bytemuck::cast(instance_bytes(&self.vk()))
+    }
+
     fn vk(&self) -> vk::AccelerationStructureInstanceKHR {
         use vk::GeometryInstanceFlagsKHR as F;
         let mut matrix = [0.0; 12];
@@ -156,9 +161,25 @@ impl Pass<'_> {
     /// # Errors
     /// A device without acceleration structures; out of memory; more instances than the device allows.
     pub fn build_tlas(&mut self, tlas: &mut Tlas, instances: &[Instance]) -> Result<(), Error> {
+        let words: Vec<[u32; 16]> = instances.iter().map(Instance::words).collect();
+        let address = self.arena().push(&words)?;
+        self.build_tlas_of(tlas, address, instances.len())
+    }
+
+    /// As [`build_tlas`](Self::build_tlas), from the [words](Instance::words) of `number` instances at a device address, a
+    /// multiple of 16.
+    ///
+    /// # Errors
+    /// As for [`build_tlas`](Self::build_tlas).
+    pub fn build_tlas_of(
+        &mut self,
+        tlas: &mut Tlas,
+        address: u64,
+        number: usize,
+    ) -> Result<(), Error> {
         let device = self.device().clone();
         let functions = functions(&device, &tlas.name)?;
-        let count = u32::try_from(instances.len()).unwrap_or(u32::MAX);
+        let count = u32::try_from(number).unwrap_or(u32::MAX);
         if let Some(limits) = device.0.info.ray_tracing
             && u64::from(count) > limits.max_instances
         {
@@ -168,11 +189,6 @@ impl Pass<'_> {
                 device: device.0.info.name.clone(),
             });
         }
-        let data: Vec<u8> = instances
-            .iter()
-            .flat_map(|i| instance_bytes(&i.vk()))
-            .collect();
-        let address = self.arena().push(&data)?;
         let geometries = [vk::AccelerationStructureGeometryKHR::default()
             .geometry_type(vk::GeometryTypeKHR::INSTANCES)
             .geometry(vk::AccelerationStructureGeometryDataKHR {
@@ -200,7 +216,7 @@ impl Pass<'_> {
                 device_address: scratch.address().next_multiple_of(align),
             });
         let ranges = [vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(count)];
-        // SAFETY: storage and scratch have the sizes that the driver requires; the instances lie in the frame's arena.
+        // SAFETY: storage and scratch have the sizes that the driver requires; the caller's address has the instances.
         unsafe {
             functions.cmd_build_acceleration_structures(self.cmd(), &[info], &[&ranges]);
         }

@@ -4,23 +4,22 @@
 //! frame: the CPU transforms them to world space, and those of equal visibility and kind share one structure, built
 //! each frame. All builds of a frame are one batch.
 
+mod kept;
+mod own;
 mod placements;
 
 use std::time::Instant;
 
 use glam::{Mat3, Vec3};
-use shaders::trace_types::constants::{INSTANCE_GRID, NO_INSTANCE};
+use shaders::trace_types::constants::NO_INSTANCE;
 use shaders::trace_types::{BvhInstance, GeometryRecord};
-use support::Aabb;
-use support::bvh::Hierarchy;
 use support::slice;
 
-use super::bvh::{INSTANCES, build_triangles, widen};
 use super::feedback::{Feedback, State};
 use super::geometry::{StaticGeometry, Structure};
 use super::input::{Kind, MaterialTable};
 use super::parts::{Parts, Seen, Slot, axes};
-use super::shapes::{Bottom, OwnBottom, Shapes, Use};
+use super::shapes::{Bottom, Shapes, Use};
 use super::tracer::Tracer;
 use crate::gpu::{
     self, Access, Blas, BlasBuild, BlasFlags, BlasGeometry, Device, Error, Recorder, Tlas,
@@ -28,6 +27,7 @@ use crate::gpu::{
 use crate::scene::TracedScene;
 use crate::statistics::MovingCost;
 
+use kept::Kept;
 pub use placements::DrawnGeometry;
 use placements::{Part, Placement, Placements};
 
@@ -89,6 +89,8 @@ struct DriverStructures {
     tlas: Tlas,
     /// Input of the last build of `tlas`: serial of the map's geometry, and all instances.
     placed: Option<(u64, Vec<gpu::Instance>)>,
+    /// The same while the GPU lists the instances.
+    kept: Option<(u64, Kept<[u32; 16]>)>,
     /// The models alone.
     models: Option<Tlas>,
 }
@@ -110,6 +112,8 @@ pub struct Accel {
     shapes: Shapes,
     /// Only with the tracers that use them.
     driver: Option<DriverStructures>,
+    /// The instances of our own top level, while the GPU lists them.
+    own_kept: Option<Kept<BvhInstance>>,
     /// Bytes of our own structures of the last frame: bottom levels, top level.
     own_bytes: [u64; 2],
     /// Makes a top level of the models alone, too.
@@ -134,10 +138,12 @@ impl Accel {
                 slots: parts.slots.iter().map(blas).collect(),
                 tlas: Tlas::new(device, "trace scene"),
                 placed: None,
+                kept: None,
                 models: None,
             }),
             parts,
             shapes: Shapes::new(device, tracer),
+            own_kept: None,
             own_bytes: [0; 2],
             has_models: false,
             cost: MovingCost::default(),
@@ -203,7 +209,8 @@ impl Accel {
         self.record_fed(rec, view, geometry, materials, &mut Feedback::default())
     }
 
-    /// As [`record`](Self::record), of bodies in the states of `feedback`, and lists their geometries there.
+    /// As [`record`](Self::record), of bodies in the states of `feedback`, and lists their geometries there. While it
+    /// counts, the GPU lists the instances of the top level: the CPU writes those that have changed.
     ///
     /// # Errors
     /// Out of memory, or a lost device.
@@ -234,6 +241,9 @@ impl Accel {
             let state = feedback.state(part.instance);
             if state == State::Inactive {
                 self.cost.left_out_parts += u64::from(part.animated);
+                // the instances after it keep their records
+                placements.skip();
+                feedback.skip_geometry();
                 continue;
             }
             let Some(instance) = slice::get(&view.instances, part.instance as usize) else {
@@ -286,12 +296,14 @@ impl Accel {
         } = placements;
         self.drawn = drawn;
         output.geometries = rec.arena().push(&records)?;
+        let fed = feedback.is_on();
         if self.driver.is_some() {
             let serial = geometry.map_or(0, |g| g.serial);
-            [output.top, output.models] = self.build_driver(rec, serial, &placed)?;
+            [output.top, output.models] = self.build_driver(rec, serial, &placed, fed)?;
         } else {
-            [output.top, output.models] = self.build_own(rec, &placed)?;
+            [output.top, output.models] = self.build_own(rec, &placed, fed)?;
         }
+        self.cost.instances += placed.len() as u64;
         self.cost.frames += 1;
         self.cost.refits = self.shapes.refits();
         self.cost.cpu_ms += begin.elapsed().as_secs_f64() * 1e3;
@@ -308,12 +320,13 @@ impl Accel {
     }
 
     /// Builds the driver's bottom levels in one batch, then the top level and that of models. `serial`: that of the map's
-    /// geometry.
+    /// geometry; `fed`: rays are counted.
     fn build_driver(
         &mut self,
         rec: &mut Recorder,
         serial: u64,
         placed: &[Placement<'_>],
+        fed: bool,
     ) -> Result<[Top; 2], Error> {
         let Some(driver) = &mut self.driver else {
             return Ok(Default::default());
@@ -357,24 +370,42 @@ impl Accel {
             }
             Part::Static(Structure::Own(_) | Structure::Grid(_)) => 0,
         };
-        let instances: Vec<gpu::Instance> = placed
-            .iter()
-            .map(|p| gpu::Instance {
-                transform: rows(p.axis, p.origin),
-                custom_index: p.record,
-                mask: p.mask,
-                sbt_offset: hit_group(p.kind),
-                cull_disable: true,
-                flip_facing: false,
-                force_opaque: None,
-                blas: address(&p.part),
-            })
-            .collect();
+        let instance = |p: &Placement<'_>| gpu::Instance {
+            transform: rows(p.axis, p.origin),
+            custom_index: p.record,
+            mask: p.mask,
+            sbt_offset: hit_group(p.kind),
+            cull_disable: true,
+            flip_facing: false,
+            force_opaque: None,
+            blas: address(&p.part),
+        };
+        // models have a top level of their own only where nothing is counted
+        if fed && driver.models.is_none() {
+            driver.placed = None;
+            let (of, mut kept) = match driver.kept.take() {
+                Some((of, kept)) => (Some(of), kept),
+                None => (None, Kept::new(rec.device())?),
+            };
+            let differs = kept.take(placed.iter().map(|p| (p.record, instance(p).words())));
+            if differs || !rests || of != Some(serial) {
+                let before = kept.written;
+                let list = kept.record(rec)?;
+                self.cost.written += kept.written - before;
+                let mut pass = rec.pass("trace_scene", Access::ACCEL_BUILD, Access::ACCEL_BUILD)?;
+                pass.build_tlas_of(&mut driver.tlas, list, kept.len())?;
+            }
+            driver.kept = Some((serial, kept));
+            return Ok(driver.tops());
+        }
+        driver.kept = None;
+        let instances: Vec<gpu::Instance> = placed.iter().map(instance).collect();
         // equal instances over the same map: the last top level is still valid
         let same = |(of, built): &(u64, Vec<gpu::Instance>)| *of == serial && *built == instances;
         if rests && driver.placed.as_ref().is_some_and(same) {
             return Ok(driver.tops());
         }
+        self.cost.written += instances.len() as u64;
         let mut pass = rec.pass("trace_scene", Access::ACCEL_BUILD, Access::ACCEL_BUILD)?;
         driver.placed = None;
         pass.build_tlas(&mut driver.tlas, &instances)?;
@@ -386,119 +417,6 @@ impl Accel {
         driver.placed = Some((serial, instances));
         Ok(driver.tops())
     }
-
-    /// Builds our own hierarchies of changing geometry, the top level and that of models, in the frame's memory.
-    fn build_own(
-        &mut self,
-        rec: &mut Recorder,
-        placed: &[Placement<'_>],
-    ) -> Result<[Top; 2], Error> {
-        let mut instances = Vec::with_capacity(placed.len());
-        let mut boxes = Vec::with_capacity(placed.len());
-        let mut of_models = Vec::new();
-        let positions = &self.parts.positions;
-        let position = |i: u32| positions.get(i as usize).copied().unwrap_or(Vec3::NAN);
-        let mut changing = 0;
-        for p in placed {
-            let found = match &p.part {
-                Part::Static(Structure::Own(own)) => Some(OwnBottom {
-                    nodes: own.nodes.address(),
-                    triangles: own.triangles.address(),
-                    bounds: own.bounds,
-                }),
-                Part::Static(Structure::Grid(grid)) => Some(OwnBottom {
-                    nodes: grid.record.address(),
-                    triangles: grid.triangles.address(),
-                    bounds: grid.bounds,
-                }),
-                Part::Slot(index) => {
-                    let indices = self.parts.slots.get(*index).map_or(&[][..], |s| &s.indices);
-                    let corners: Vec<[Vec3; 3]> = indices.iter().map(|t| t.map(position)).collect();
-                    match build_triangles(&corners) {
-                        Some(hierarchy) => {
-                            changing += size_of_val(hierarchy.nodes.as_slice())
-                                + size_of_val(hierarchy.triangles.as_slice());
-                            Some(OwnBottom {
-                                nodes: rec.arena().push(&hierarchy.nodes)?,
-                                triangles: rec.arena().push(&hierarchy.triangles)?,
-                                bounds: hierarchy.bounds,
-                            })
-                        }
-                        None => None,
-                    }
-                }
-                Part::Kept(index, prepared) => {
-                    let part = self.parts.parts.get(*index);
-                    match part.and_then(|part| self.shapes.bottom(&self.parts, part, prepared)) {
-                        Some(Bottom::Own(own)) => Some(own),
-                        Some(Bottom::Driver(_)) | None => None,
-                    }
-                }
-                Part::Static(Structure::Driver(_)) => None,
-            };
-            let Some(own) = found else {
-                continue; // without a triangle
-            };
-            let structure = match p.part {
-                Part::Static(Structure::Grid(_)) => INSTANCE_GRID,
-                _ => 0,
-            };
-            let inverse = p.axis.inverse();
-            if p.of_model {
-                of_models.push(boxes.len());
-            }
-            boxes.push(Aabb::of(
-                own.bounds.corners().map(|c| p.axis * c + p.origin),
-            ));
-            instances.push(BvhInstance {
-                nodes: own.nodes,
-                triangles: own.triangles,
-                to_object: rows(inverse, -(inverse * p.origin)),
-                geometry: p.record,
-                mask: u32::from(p.mask) | structure,
-            });
-        }
-        let (top, bytes) = own_top(rec, &boxes, &instances)?;
-        self.own_bytes = [changing as u64, bytes];
-        let mut models = Top::default();
-        if self.has_models {
-            let boxes: Vec<Aabb> = pick(&boxes, &of_models);
-            let instances: Vec<BvhInstance> = pick(&instances, &of_models);
-            (models, _) = own_top(rec, &boxes, &instances)?;
-        }
-        Ok([top, models])
-    }
-}
-
-/// The members of a list at these places.
-fn pick<T: Copy>(list: &[T], places: &[usize]) -> Vec<T> {
-    places
-        .iter()
-        .filter_map(|&i| list.get(i).copied())
-        .collect()
-}
-
-/// A top level of ours in the frame's memory, and its bytes.
-fn own_top(
-    rec: &mut Recorder,
-    boxes: &[Aabb],
-    instances: &[BvhInstance],
-) -> Result<(Top, u64), Error> {
-    let top = Hierarchy::new(boxes, INSTANCES);
-    let ordered: Vec<BvhInstance> = (top.order().iter())
-        .filter_map(|&i| instances.get(i as usize).copied())
-        .collect();
-    let nodes = widen(&top);
-    let bytes = size_of_val(nodes.as_slice()) + size_of_val(ordered.as_slice());
-    if nodes.is_empty() {
-        return Ok((Top::default(), bytes as u64));
-    }
-    let top = Top {
-        nodes: rec.arena().push(&nodes)?,
-        placed: rec.arena().push(&ordered)?,
-        ..Top::default()
-    };
-    Ok((top, bytes as u64))
 }
 
 /// Rows of an instance's transform.

@@ -354,6 +354,16 @@ impl Feedback {
         self.geometries.push(Counted { body, id, animated });
     }
 
+    /// Adds the geometry of a part that is left out.
+    pub fn skip_geometry(&mut self) {
+        let (body, id) = (NONE, NONE);
+        self.geometries.push(Counted {
+            body,
+            id,
+            animated: false,
+        });
+    }
+
     fn counters(&self) -> usize {
         self.geometries.len() + self.boxes.len()
     }

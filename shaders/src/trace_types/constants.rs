@@ -30,6 +30,9 @@ pub const CUT_OUTS_MASKED: u32 = 3;
 /// Photons in a row of their launch.
 pub const PHOTON_ROW: u32 = 512;
 
+/// Words in a row of the launch that moves records of instances.
+pub const LIST_ROW: u32 = 262144;
+
 /// Bit of `LightGrid::segments`: the other side has vertices of its own behind those of the first.
 pub const GRID_TWO_SIDED: u32 = 0x10000;
 /// Mask of the number of segments.

@@ -33,6 +33,26 @@ pub struct FilterStep {
     pub padding: u32,
 }
 
+/// Push constants of the pass that moves records of instances (`instance_list.comp`).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct ListStep {
+    /// Records to be read.
+    pub source: u64,
+    /// 32-bit place of each entry.
+    pub places: u64,
+    /// Records to be written.
+    pub target: u64,
+    /// 32-bit words of a record.
+    pub words: u32,
+    /// Number of entries.
+    pub count: u32,
+    /// 1: entry after entry is read, and written to its place; 0: read from its place, and written entry after entry.
+    pub to_places: u32,
+    /// Makes the size a multiple of 8 bytes.
+    pub padding: u32,
+}
+
 /// Push constants of a pass other than a filter step.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]

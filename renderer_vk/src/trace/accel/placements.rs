@@ -87,6 +87,11 @@ impl<'a> Placements<'a> {
         }
     }
 
+    /// Adds the record of a part that is left out.
+    pub fn skip(&mut self) {
+        self.records.push(GeometryRecord::default());
+    }
+
     /// Adds the world and the brush models of a view.
     pub fn add_map(&mut self, view: &TracedScene, geometry: &'a StaticGeometry) {
         let submodels = view.look.submodels.iter().map(|s| (s.model, s.instance));

@@ -1,12 +1,14 @@
 //! Feedback of rays on structures: what is counted, and pictures beside those without feedback.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use shaders::types::constants as c;
 
 use super::harness::{
     Gpu, Scene, floor_at, gpu_tests, identity, mirror_at, rectangle, stage, wall_at,
 };
-use crate::scene::{MeshId, Shape, TracedScene};
+use crate::scene::{MeshId, RigidMesh, Shape, TracedScene};
 use crate::settings::{DenoiserChoice, HitFeedback, Settings};
 use crate::statistics::MovingCost;
 use crate::trace::view_tracer::ViewTracer;
@@ -17,6 +19,7 @@ gpu_tests! {
         counting_and_feedback_leave_a_scene_at_rest_as_it_is,
         bodies_that_move_unseen_are_right_when_they_enter_the_view,
         a_body_in_a_mirror_is_right_after_two_frames,
+        instances_that_the_gpu_lists_are_those_that_the_cpu_writes,
     ],
 }
 
@@ -44,6 +47,18 @@ fn animated(scene: &mut Scene, points: [Vec3; 4], material: u32) {
         level: 0,
         surface: 0,
     });
+}
+
+/// Adds a rectangle of constant shape.
+fn rigid(scene: &mut Scene, points: [Vec3; 4], material: u32) {
+    scene.mesh(points, material, identity());
+    let mesh = scene.meshes.last_mut().expect("added");
+    let vertices = scene.dynamic_vertices.split_off(mesh.first_vertex as usize);
+    let indices = scene.dynamic_indices.split_off(mesh.first_index as usize);
+    let indices = indices.iter().map(|i| i - mesh.first_vertex).collect();
+    (mesh.vertex_count, mesh.index_count) = (0, 0);
+    mesh.shape = Shape::Rigid(scene.rigid.len() as u32);
+    (scene.rigid).push(Arc::new(RigidMesh::new(vertices, indices)));
 }
 
 /// A square that faces +x, around the x axis.
@@ -194,4 +209,49 @@ fn a_body_in_a_mirror_is_right_after_two_frames(gpu: &mut Gpu) {
     let differs: Vec<usize> = (0..plain.len()).filter(|&i| plain[i] != fed[i]).collect();
     // the counts of a frame are read two frames later
     assert_eq!(differs, [REST as usize, REST as usize + 1]);
+}
+
+fn instances_that_the_gpu_lists_are_those_that_the_cpu_writes(gpu: &mut Gpu) {
+    let mut scene = Scene::hall(60.0, 0.6, SIZE);
+    scene.point(Vec3::new(-20.0, 60.0, 90.0), 20_000.0, 4.0);
+    scene.ambient = Vec3::splat(0.05);
+    let red = scene.material(&[stage::light(), stage::filter([0.9, 0.3, 0.3])], 0);
+    const BODIES: u32 = 40;
+    for i in 0..BODIES {
+        let points = floor_at(-60.0 + i as f32, 3.0).map(|p| p + Vec3::Y * (i as f32 * 4.0 - 80.0));
+        match i % 8 {
+            0 => animated(&mut scene, points, red),
+            _ => rigid(&mut scene, points, red),
+        }
+    }
+    let all = scene.view();
+    // one body moves in each frame; some go, and come back
+    let path = |frame: u32, view: &mut TracedScene| {
+        let first = view.look.entities[0].first_instance;
+        let moved = (first + frame * 5 % BODIES) as usize;
+        view.instances[moved].origin.z += 7.0;
+        view.meshes.clone_from(&all.meshes);
+        view.look.entities.clone_from(&all.look.entities);
+        if (6..12).contains(&frame) {
+            // an entity has one mesh
+            let left = all.meshes.len() - frame as usize;
+            view.meshes.truncate(left);
+            view.look.entities.truncate(left);
+        }
+    };
+    let number = 18;
+    let (plain, cpu) = frames(gpu, &scene, &live(HitFeedback::None), number, path);
+    let (listed, kept) = frames(gpu, &scene, &live(HitFeedback::Counts), number, path);
+    for (frame, (a, b)) in plain.iter().zip(&listed).enumerate() {
+        assert!(a == b, "frame {frame}");
+    }
+    assert!(plain[0] != plain[8]);
+    assert_eq!(
+        (cpu.written, kept.instances),
+        (cpu.instances, cpu.instances)
+    );
+    // the first list, what moves, what is animated: our own structures of these have new addresses
+    let most = u64::from(BODIES + number * (1 + BODIES.div_ceil(8))) + 8;
+    assert!(kept.written < most, "{kept:?}");
+    assert!(kept.written > u64::from(BODIES + number / 2), "{kept:?}");
 }
