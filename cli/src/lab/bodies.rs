@@ -5,9 +5,11 @@ mod model;
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 use clap::Args;
+use glam::Vec3;
 use indicatif::{ProgressBar, ProgressStyle};
 use relight::Overlay;
 use renderer_vk::api::{RefDef, RefEntity};
@@ -28,10 +30,10 @@ use crate::view::{Camera, draw, load, map_name, open, placed};
 /// Measure the structures of bodies: refits saved by the feedback of rays, milliseconds, bytes, differing pixels
 ///
 /// Spreads made-up bodies over the open space of a map, animated ones of 400 triangles and still ones of 16, and draws
-/// the same frames without and with rt_hitFeedback in turns. Prints for each run: refits a part, bodies left out and
-/// milliseconds of the structures on the CPU, of the second half of the frames; medians of the structures on the GPU and
-/// of whole frames; bytes of the structures; then the frames whose pictures differ, with the number of pixels that do by
-/// more than 2 of 255. The camera may turn, so that bodies come into view.
+/// the same frames without and with rt_hitFeedback in turns. Prints after each run: refits a part, bodies left out,
+/// instances written by the CPU and milliseconds of the structures on the CPU, of the second half of the frames; medians
+/// of the structures on the GPU and of whole frames; bytes of the structures; then the frames whose pictures differ, with
+/// the number of pixels that do by more than 2 of 255. The camera may turn, so that bodies come into view.
 ///
 /// Examples: relight-lab bodies oa_dm1 --animated 5000; relight-lab bodies kaos2 --still 1000000 --frames 20 --runs 1
 #[derive(Args, Debug)]
@@ -41,9 +43,9 @@ pub struct BodiesArgs {
     map: String,
     #[command(flatten)]
     game: Game,
-    /// Number of animated bodies
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=100_000))]
-    animated: u32,
+    /// Number of animated bodies; default: 5000, or 0 with --still
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=100_000))]
+    animated: Option<u32>,
     /// Number of still bodies
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=4_000_000))]
     still: u32,
@@ -68,6 +70,9 @@ pub struct BodiesArgs {
     /// Number of runs, in which all variants take turns
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
     runs: u32,
+    /// Seconds after which frames, runs and the comparison are cut short: at least 4 frames of each variant are drawn
+    #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
+    seconds: u32,
     /// Omit the comparison of the pictures
     #[arg(long)]
     no_pictures: bool,
@@ -87,8 +92,19 @@ const FOV: f32 = 90.0;
 /// Time of a frame, milliseconds of the game.
 const FRAME_MS: u32 = 16;
 
+/// Frames after which the feedback has found what rests, with as many that show it.
+const SHOWING: u32 = 24;
+
+/// Fewest frames.
+const FEWEST: u32 = 4;
+
 /// Passes that build structures and count rays.
-const STRUCTURES: [&str; 3] = ["trace_accel", "trace_scene", "trace_feedback"];
+const STRUCTURES: [&str; 4] = [
+    "trace_accel",
+    "trace_instances",
+    "trace_scene",
+    "trace_feedback",
+];
 
 /// Difference of a channel above which pixels differ.
 const SAME: u8 = 2;
@@ -118,11 +134,12 @@ impl Row {
         let ms = |ms: Option<f64>| ms.map_or_else(|| "–".to_owned(), |ms| format!("{ms:.3}"));
         let moving = &self.moving;
         format!(
-            "| {} | {} | {} | {} | {:.3} | {} | {} | {} | {:.1} | {:.1} |",
+            "| {} | {} | {} | {} | {} | {:.3} | {} | {} | {} | {:.1} | {:.1} |",
             if self.feedback { "with" } else { "without" },
             of(moving.refits, moving.parts + moving.left_out_parts),
             of(moving.unmet, moving.counted),
             of(moving.left_out, moving.bodies),
+            of(moving.written, moving.instances),
             self.structures_cpu_ms,
             ms(self.structures_gpu_ms),
             ms(self.gpu_ms),
@@ -156,35 +173,33 @@ struct Report {
 }
 
 impl Report {
-    fn lines(&self) -> Vec<String> {
+    /// What precedes the rows.
+    fn head(&self) -> String {
         let (width, height) = self.size;
-        let mut lines = vec![
-            format!(
-                "{}, {}, {width}x{height}, {}: {} animated and {} still bodies, {} frames",
-                self.device,
-                self.tracer.as_deref().unwrap_or("no tracer"),
-                self.map,
-                self.animated,
-                self.still,
-                self.frames
-            ),
-            String::new(),
-            "| feedback | refits a part | parts met by no ray | bodies left out | structures, CPU ms | structures, GPU ms | frame, GPU ms | frame, CPU ms | structures, MB | shared, MB |".into(),
-            "|---|---|---|---|---|---|---|---|---|---|".into(),
-        ];
-        lines.extend(self.rows.iter().map(Row::line));
-        if let Some(differing) = &self.differing {
-            lines.push(String::new());
-            let each: Vec<String> = (differing.iter())
-                .map(|d| format!("{}: {}", d.frame, d.pixels))
-                .collect();
-            lines.push(format!(
-                "{} frames differ; frame and pixels: {}",
-                each.len(),
-                each.join(", ")
-            ));
-        }
-        lines
+        format!(
+            "{}, {}, {width}x{height}, {}: {} animated and {} still bodies, {} frames\n\n\
+             | feedback | refits a part | parts met by no ray | bodies left out | instances written | structures, CPU ms | structures, GPU ms | frame, GPU ms | frame, CPU ms | structures, MB | shared, MB |\n\
+             |---|---|---|---|---|---|---|---|---|---|---|",
+            self.device,
+            self.tracer.as_deref().unwrap_or("no tracer"),
+            self.map,
+            self.animated,
+            self.still,
+            self.frames
+        )
+    }
+
+    /// What follows them.
+    fn tail(&self) -> Option<String> {
+        let differing = self.differing.as_ref()?;
+        let each: Vec<String> = (differing.iter())
+            .map(|d| format!("{}: {}", d.frame, d.pixels))
+            .collect();
+        Some(format!(
+            "\n{} frames differ; frame and pixels: {}",
+            each.len(),
+            each.join(", ")
+        ))
     }
 }
 
@@ -196,6 +211,11 @@ struct Stage<'a> {
     /// Indices of the animated bodies in `entities`.
     animated: std::ops::Range<usize>,
     camera: Camera,
+    /// Places of all bodies, once they are known.
+    places: Option<Vec<Vec3>>,
+    /// Number of frames, once it is known.
+    frames: Option<u32>,
+    begun: Instant,
     bar: ProgressBar,
 }
 
@@ -217,6 +237,37 @@ impl Stage<'_> {
         let def = self.def(frame);
         self.bar.inc(1);
         draw(&mut self.renderer, &self.entities, &def)
+    }
+
+    /// Whether a frame follows so many, the first of which began at `first`. The first run finds how many the time allows: its
+    /// frames take a quarter of what loading has left, more if they are few.
+    fn goes_on(&mut self, drawn: u32, first: Instant) -> bool {
+        let limit = Duration::from_secs(self.args.seconds.into());
+        let left = limit.saturating_sub(first - self.begun);
+        let share = left.max(limit / 4) / 4;
+        let passed = first.elapsed();
+        let late = drawn >= SHOWING && passed > share || passed > share * 2;
+        let most = self.frames.unwrap_or(match late && drawn >= FEWEST {
+            true => drawn,
+            false => self.args.frames,
+        });
+        if drawn >= most {
+            self.frames = Some(most);
+        }
+        drawn < most
+    }
+
+    /// Tells where the command is, if no bar shows it.
+    fn tell(&self, what: &str) {
+        if self.bar.is_hidden() {
+            eprintln!("{:.1} s: {what}", self.begun.elapsed().as_secs_f32());
+        }
+    }
+
+    /// Whether the time allows frames that take as long as those since `begun`.
+    fn has_time(&self, begun: Instant) -> bool {
+        let limit = Duration::from_secs(self.args.seconds.into());
+        self.begun.elapsed() + begun.elapsed() <= limit
     }
 }
 
@@ -252,6 +303,9 @@ pub fn run(args: &BodiesArgs) -> Result<()> {
         entities: Vec::new(),
         animated: 0..0,
         camera: Camera::default(),
+        places: None,
+        frames: None,
+        begun: Instant::now(),
         bar,
     };
     let mut report = Report {
@@ -259,26 +313,40 @@ pub fn run(args: &BodiesArgs) -> Result<()> {
         tracer: None,
         map: map_name(&open(&args.map, &args.game)?.1).to_owned(),
         size: args.size,
-        frames: args.frames,
+        frames: 0,
         animated: 0,
         still: 0,
         rows: Vec::new(),
         differing: None,
     };
-    for _ in 0..args.runs {
+    let mut pair = Instant::now();
+    for run in 0..args.runs {
+        if run > 0 && !stage.has_time(pair) {
+            eprintln!("{run} of {} runs: --seconds {}", args.runs, args.seconds);
+            break;
+        }
+        pair = Instant::now();
         for settings in &variants {
             begin(&mut stage, settings)?;
             report.rows.push(measure(&mut stage, settings)?);
+            if report.tracer.is_none() {
+                report.tracer = stage.renderer.costs().tracer;
+                report.frames = stage.frames.unwrap_or(args.frames);
+                report.animated = stage.animated.len();
+                report.still = stage.entities.len() - stage.animated.end;
+                stage.bar.suspend(|| println!("{}", report.head()));
+            }
+            let row = report.rows.last().map(Row::line).unwrap_or_default();
+            stage.bar.suspend(|| println!("{row}"));
         }
     }
-    report.tracer = stage.renderer.costs().tracer;
-    report.animated = stage.animated.len();
-    report.still = stage.entities.len() - stage.animated.end;
-    if !args.no_pictures {
+    if !args.no_pictures && stage.has_time(pair) {
         report.differing = Some(compare(&mut stage, &variants)?);
+    } else if !args.no_pictures {
+        eprintln!("pictures were not compared: --seconds {}", args.seconds);
     }
     stage.bar.finish_and_clear();
-    report.lines().iter().for_each(|line| println!("{line}"));
+    (report.tail().iter()).for_each(|tail| println!("{tail}"));
     if let Some(output) = &args.output {
         let json = serde_json::to_string_pretty(&report)? + "\n";
         write_whole(output, json.as_bytes())?;
@@ -299,8 +367,12 @@ fn begin(stage: &mut Stage<'_>, settings: &Settings) -> Result<()> {
     let (bsp, entities) = load(&mut stage.renderer, files, &path, settings)?;
     stage.entities = entities;
     let models = [model::ANIMATED, model::STILL].map(|name| stage.renderer.register_model(name));
-    let [animated, still] = [args.animated, args.still].map(|n| n as usize);
-    let places = model::places(&bsp, animated + still);
+    let animated = args
+        .animated
+        .unwrap_or(if args.still > 0 { 0 } else { 5000 });
+    let [animated, still] = [animated, args.still].map(|n| n as usize);
+    let is_first = stage.places.is_none();
+    let places = (stage.places).get_or_insert_with(|| model::places(&bsp, animated + still));
     let first = stage.entities.len();
     let bodies = places.iter().enumerate().map(|(number, place)| {
         let of = usize::from(number >= animated);
@@ -310,22 +382,31 @@ fn begin(stage: &mut Stage<'_>, settings: &Settings) -> Result<()> {
     stage.animated = first..first + animated.min(places.len());
     let camera = args.view.or_else(|| Camera::of_map(&bsp));
     stage.camera = camera.context("the map has no place for a camera; set one with --view")?;
+    if is_first {
+        let bodies = stage.entities.len() - first;
+        stage.tell(&format!("{}: {bodies} bodies are placed", args.map));
+    }
     Ok(())
 }
 
 /// Draws all frames, and returns their cost.
 fn measure(stage: &mut Stage<'_>, settings: &Settings) -> Result<Row> {
     let mut timings = Timings::new(&stage.renderer);
-    // once the feedback has found what rests
-    let (begin, mut before) = (stage.args.frames / 2, MovingCost::default());
-    for frame in 0..stage.args.frames {
-        if frame == begin {
-            before = stage.renderer.moving_cost().unwrap_or_default();
-        }
-        let stats = stage.draw(frame)?;
+    let mut costs = Vec::new();
+    let mut first = Instant::now();
+    while stage.goes_on(u32::try_from(costs.len())?, first) {
+        costs.push(stage.renderer.moving_cost().unwrap_or_default());
+        let stats = stage.draw(u32::try_from(costs.len() - 1)?)?;
         timings.add(&stage.renderer, &stats);
+        if costs.len() == 1 {
+            // the driver compiles for it
+            stage.tell("the first frame is drawn");
+            first = Instant::now();
+        }
     }
     timings.finish(&mut stage.renderer)?;
+    // once the feedback has found what rests
+    let before = costs.get(costs.len() / 2).copied().unwrap_or_default();
     let median = |spread: Option<Spread>| spread.map(|s| s.median);
     let passes = timings.passes();
     let structures = passes.iter().filter(|(name, _)| STRUCTURES.contains(name));
@@ -358,7 +439,7 @@ fn compare(stage: &mut Stage<'_>, variants: &[Settings; 2]) -> Result<Vec<Differ
     let mut differing = Vec::new();
     for (number, settings) in variants.iter().enumerate() {
         begin(stage, settings)?;
-        for frame in 0..stage.args.frames {
+        for frame in 0..stage.frames.unwrap_or(stage.args.frames) {
             stage.draw(frame)?;
             let picture = stage.renderer.read_pixels()?.rgb;
             if number == 0 {
