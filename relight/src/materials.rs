@@ -11,6 +11,7 @@ use crate::files::GameFiles;
 use crate::image;
 use by_hand::MaterialsByHand;
 use finish::Finish;
+use of_pack::Usual;
 use shaderscript::{Diagnostic, ImplicitKind, Library, Shader};
 use std::collections::{HashMap, HashSet};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
@@ -21,8 +22,8 @@ pub struct Materials {
     library: Library,
     /// The scripts with `.mtr` files in place of those of the same names, if there are any.
     with_mtr: Option<Library>,
-    /// Maps of reflection have the channels of `r_pbr 1`.
-    pbr: bool,
+    /// What `opengl2`'s variables state for materials that state nothing.
+    usual: Usual,
     /// Names that are no maps of other images.
     drawn: OnceLock<HashSet<String>>,
     /// Whether the image of a name exists, for names requested so far.
@@ -96,7 +97,7 @@ impl Materials {
         let variables = |name: &str| files.variable(name);
         let library = |scripts| Library::of_engine(scripts, &variables, files.precedence());
         let mut materials = Materials::from_library(library(scripts));
-        materials.pbr = shaderscript::token::number(&files.variable("r_pbr")) != 0.0;
+        materials.usual = Usual::of_variables(&variables);
         materials.with_mtr = replaced.then(|| library(with_mtr));
         materials.unusable.extend_from_slice(&unreadable);
         unreadable.extend_from_slice(materials.library.diagnostics());
@@ -112,7 +113,7 @@ impl Materials {
             unusable: library.dropped().to_vec(),
             library,
             with_mtr: None,
-            pbr: false,
+            usual: Usual::default(),
             drawn: OnceLock::new(),
             images: Mutex::default(),
             reported: Mutex::default(),

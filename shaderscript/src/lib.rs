@@ -32,7 +32,7 @@ pub use diagnostic::{Diagnostic, Severity};
 pub use implicit::ImplicitKind;
 pub use library::{Library, Precedence, strip_extension};
 pub use parse::{Script, Variables, parse_script};
-pub use reflection::{NormalStage, Reflection, SpecularStage};
+pub use reflection::{GlossType, NormalStage, Reflection, SpecularStage};
 pub use shader::{
     Cull, Deform, Fog, LightDirectives, Location, Shader, Sky, Sun, UnknownDirective, sort,
 };

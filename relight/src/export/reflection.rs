@@ -142,7 +142,7 @@ fn pictures(map: &SurfaceMap, roughness: f32) -> (Picture, Option<Picture>) {
     let made = Picture::Reflection;
     match map {
         SurfaceMap::RoughnessMetal(name) => (Picture::File(name.clone()), None),
-        SurfaceMap::Specular(_) => {
+        SurfaceMap::Specular(_) | SurfaceMap::Gloss { .. } => {
             let least = (roughness.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
             let rough = ReflectionImage::Roughness(map.clone(), least);
             let reflectance = ReflectionImage::Reflectance(map.clone());

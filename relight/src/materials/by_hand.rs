@@ -148,6 +148,7 @@ impl MaterialsByHand {
                     finish.normals = Some(NormalMap {
                         image: image.clone(),
                         scale: Vec2::splat(*scale),
+                        depth: 0.0,
                     });
                 }
                 Statement::Surface(image) => {
@@ -306,6 +307,7 @@ mod tests {
         let normals = NormalMap {
             image: "textures/n_n".to_owned(),
             scale: Vec2::splat(0.5),
+            depth: 0.0,
         };
         assert_eq!(steel.normals, Some(normals));
         let surface = SurfaceMap::RoughnessMetal("textures/n_rm".to_owned());

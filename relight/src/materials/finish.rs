@@ -3,6 +3,7 @@
 use std::fmt;
 
 use glam::{Vec2, Vec3};
+use shaderscript::GlossType;
 
 use crate::files::GameFiles;
 use crate::image::{self, Image, ImageError};
@@ -30,6 +31,9 @@ pub enum MapFault {
     /// The image is something else. One of a single channel is grey.
     #[error("{0} is no normal map: its mean colour is not blue; the surface stays without it")]
     NotNormals(String),
+    /// The alpha of the normal map, which should have heights, is missing or 1 everywhere.
+    #[error("{0} has no heights: its alpha is missing or full; the surface stays flat")]
+    NoHeights(String),
 }
 
 /// What is stated about a material. What is `None` is as without.
@@ -75,15 +79,18 @@ pub struct NormalMap {
     pub image: String,
     /// Factors of the first two components; the third completes them to unit length.
     pub scale: Vec2,
+    /// Depth of an alpha of 0 below one of 1, in texture coordinates; 0: the alpha has no heights.
+    pub depth: f32,
 }
 
 impl NormalMap {
     /// An image of normals whose y points down the image, as in Direct3D: `opengl2` and Quake II RTX apply it along the
     /// texture coordinate t, which grows downwards.
-    pub fn downward(image: String, scale: Vec2) -> Self {
+    pub fn downward(image: String, scale: Vec2, depth: f32) -> Self {
         NormalMap {
             image,
             scale: Vec2::new(scale.x, -scale.y),
+            depth,
         }
     }
 }
@@ -163,6 +170,22 @@ impl Finish {
         }
     }
 
+    /// Leaves out the heights of the normal map if it has none. `alpha`: mean of its alpha.
+    ///
+    /// # Errors
+    /// They were left out.
+    pub fn check_heights(&mut self, alpha: Option<f32>) -> Result<(), MapFault> {
+        // of 8 bits, with what averaging may lose
+        const FULL: f32 = 1.0 - 0.1 / 255.0;
+        match &mut self.normals {
+            Some(map) if map.depth != 0.0 && alpha.is_some_and(|mean| mean >= FULL) => {
+                map.depth = 0.0;
+                Err(MapFault::NoHeights(map.image.clone()))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Forgets roughness, metal and reflectance: the numbers are factors of the map.
     pub(super) fn forget_gloss(&mut self) {
         (self.roughness, self.reflectance, self.metal, self.surface) = (None, None, None, None);
@@ -203,15 +226,26 @@ impl Finish {
 pub enum SurfaceMap {
     /// Roughness in green and metal in blue, as in glTF.
     RoughnessMetal(String),
-    /// Smoothness in red and metal in green: `specularMap` of `opengl2` with `r_pbr 1`.
-    SmoothnessMetal {
+    /// Gloss in red and metal in green: `specularMap` of `opengl2` with `r_pbr 1`.
+    GlossMetal {
         /// The image.
         image: String,
-        /// Factor of its smoothness, in 255ths.
+        /// Factor of its gloss, in 255ths.
         scale: u8,
+        /// What a gloss means.
+        gloss_type: GlossType,
     },
     /// Colour of the reflection, display-encoded, and smoothness in alpha: `specularMap` of `opengl2`.
     Specular(String),
+    /// The same with a gloss of another meaning in alpha (`r_glossType`).
+    Gloss {
+        /// The image.
+        image: String,
+        /// Factor of its gloss, in 255ths.
+        scale: u8,
+        /// What a gloss means.
+        gloss_type: GlossType,
+    },
     /// Roughness and metal in the alpha of two images: `.mat` files of Quake II RTX.
     Alphas {
         /// Image with roughness in its alpha; 1 without.
@@ -225,13 +259,25 @@ impl fmt::Display for SurfaceMap {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             SurfaceMap::RoughnessMetal(image) => write!(f, "{image}"),
-            SurfaceMap::SmoothnessMetal { image, scale: 255 } => {
-                write!(f, "{image} (smoothness and metal)")
-            }
-            SurfaceMap::SmoothnessMetal { image, scale } => {
-                write!(f, "{image} (smoothness times {scale}/255, and metal)")
-            }
+            SurfaceMap::GlossMetal {
+                image,
+                scale: 255,
+                gloss_type,
+            } => write!(f, "{image} ({gloss_type} and metal)"),
+            SurfaceMap::GlossMetal {
+                image,
+                scale,
+                gloss_type,
+            } => write!(f, "{image} ({gloss_type} times {scale}/255, and metal)"),
             SurfaceMap::Specular(image) => write!(f, "{image} (reflectance and smoothness)"),
+            SurfaceMap::Gloss {
+                image,
+                scale,
+                gloss_type,
+            } => write!(
+                f,
+                "{image} (reflectance and {gloss_type} times {scale}/255)"
+            ),
             SurfaceMap::Alphas {
                 roughness: None,
                 metal,
@@ -247,15 +293,16 @@ impl fmt::Display for SurfaceMap {
 impl SurfaceMap {
     /// Whether [`load`](Self::load) returns reflectance and smoothness, not roughness and metal.
     pub fn is_specular(&self) -> bool {
-        matches!(self, SurfaceMap::Specular(_))
+        matches!(self, SurfaceMap::Specular(_) | SurfaceMap::Gloss { .. })
     }
 
     /// The name of its image; of two images, that of metal.
     pub fn image(&self) -> &str {
         match self {
             SurfaceMap::RoughnessMetal(image)
-            | SurfaceMap::SmoothnessMetal { image, .. }
+            | SurfaceMap::GlossMetal { image, .. }
             | SurfaceMap::Specular(image)
+            | SurfaceMap::Gloss { image, .. }
             | SurfaceMap::Alphas { metal: image, .. } => image,
         }
     }
@@ -275,10 +322,21 @@ impl SurfaceMap {
         };
         Ok(match self {
             SurfaceMap::RoughnessMetal(name) | SurfaceMap::Specular(name) => image(name)?,
-            SurfaceMap::SmoothnessMetal { image: name, scale } => {
-                let scale = u32::from(*scale);
-                let rough = |smooth: u8| 255 - ((u32::from(smooth) * scale + 127) / 255) as u8;
+            SurfaceMap::GlossMetal {
+                image: name,
+                scale,
+                gloss_type,
+            } => {
+                let rough = |gloss: u8| roughness(*gloss_type, gloss, *scale);
                 image(name)?.map(|i| each(i, &|[r, g, _, _]| [255, rough(r), g, 255]))
+            }
+            SurfaceMap::Gloss {
+                image: name,
+                scale,
+                gloss_type,
+            } => {
+                let smooth = |gloss: u8| 255 - roughness(*gloss_type, gloss, *scale);
+                image(name)?.map(|i| each(i, &|[r, g, b, a]| [r, g, b, smooth(a)]))
             }
             SurfaceMap::Alphas { roughness, metal } => {
                 let metal = image(metal)?;
@@ -292,6 +350,13 @@ impl SurfaceMap {
             }
         })
     }
+}
+
+/// Roughness of a texel's gloss times a factor in 255ths, of 255.
+fn roughness(gloss_type: GlossType, gloss: u8, scale: u8) -> u8 {
+    let gloss = f32::from(gloss) * f32::from(scale) / (255.0 * 255.0);
+    // the cast clamps
+    (gloss_type.roughness(gloss) * 255.0).round() as u8
 }
 
 /// Roughness (green) and metal (blue) from the alpha of two images, in the larger one's size.
@@ -343,8 +408,27 @@ mod tests {
         assert_eq!(load(SurfaceMap::Specular(name())), stored);
         for (scale, rough) in [(255, 245), (51, 253)] {
             let image = name();
-            let smooth = load(SurfaceMap::SmoothnessMetal { image, scale });
+            let gloss_type = GlossType::Smoothness;
+            let smooth = load(SurfaceMap::GlossMetal {
+                image,
+                scale,
+                gloss_type,
+            });
             assert_eq!(smooth, Some(vec![255, rough, 20, 255]));
+        }
+        // an alpha of 40, and of 20
+        for (gloss_type, scale, smooth) in [
+            (GlossType::Gloss, 255, 71),
+            (GlossType::Roughness, 255, 215),
+            (GlossType::Roughness, 128, 235),
+            (GlossType::Shininess, 255, 204),
+        ] {
+            let map = SurfaceMap::Gloss {
+                image: name(),
+                scale,
+                gloss_type,
+            };
+            assert_eq!(load(map), Some(vec![10, 20, 30, smooth]), "{gloss_type}");
         }
         let alphas = |roughness: Option<&str>, metal: &str| SurfaceMap::Alphas {
             roughness: roughness.map(str::to_owned),
@@ -381,6 +465,7 @@ mod tests {
                 normals: Some(NormalMap {
                     image: "a_n".to_owned(),
                     scale: Vec2::ONE,
+                    depth: 0.0,
                 }),
                 ..Finish::default()
             };

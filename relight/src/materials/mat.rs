@@ -156,7 +156,11 @@ impl Mat {
         let mut finish = Finish::default();
         if let Some(normals) = &self.normals {
             let scale = self.bump_scale.unwrap_or(1.0);
-            finish.normals = Some(NormalMap::downward(normals.clone(), Vec2::splat(scale)));
+            finish.normals = Some(NormalMap::downward(
+                normals.clone(),
+                Vec2::splat(scale),
+                0.0,
+            ));
             finish.surface = Some(SurfaceMap::Alphas {
                 roughness: self.base.clone().filter(|_| self.roughness.is_none()),
                 metal: normals.clone(),

@@ -7,18 +7,58 @@
 use std::collections::HashSet;
 
 use glam::{Vec2, Vec3};
-use shaderscript::{Shader, SpecularStage, StageImage, TcGen, strip_extension};
+use shaderscript::token::number;
+use shaderscript::{GlossType, Shader, SpecularStage, StageImage, TcGen, strip_extension};
 
 use super::Materials;
 use super::finish::{Finish, NormalMap, SurfaceMap};
 
-/// Suffixes of normal maps beside an image, in the order tried. Heights in the alpha of the first are not used.
-const NORMALS: [&str; 2] = ["_nh", "_n"];
+/// Suffixes of normal maps beside an image, in the order tried, and whether they have heights in their alpha.
+const NORMALS: [(&str, bool); 2] = [("_nh", true), ("_n", false)];
 /// Suffix of maps of reflection beside an image.
 const SPECULAR: &str = "_s";
-/// Reflectance and smoothness of `opengl2` (`r_baseSpecular`, `r_baseGloss`) where a definition states only the other.
-const BASE_SPECULAR: f32 = 0.04;
-const BASE_GLOSS: f32 = 0.3;
+
+/// What `opengl2`'s variables state for materials that state nothing.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Usual {
+    /// `r_pbr`: maps of reflection have gloss in red and metal in green.
+    pbr: bool,
+    /// `r_glossType`.
+    gloss_type: GlossType,
+    /// `r_baseNormalX`, `r_baseNormalY`: factors of normal maps.
+    normal: Vec2,
+    /// `r_baseParallax`: depth of heights, in texture coordinates.
+    depth: f32,
+    /// `r_baseSpecular`, `r_baseGloss`: where a definition states only the other.
+    reflectance: f32,
+    gloss: f32,
+}
+
+impl Default for Usual {
+    fn default() -> Self {
+        Usual::of_variables(&|_| String::new())
+    }
+}
+
+impl Usual {
+    /// By the engine's variables; those that it does not have are as `opengl2` sets them.
+    pub(super) fn of_variables(variable: &dyn Fn(&str) -> String) -> Usual {
+        let or = |name: &str, usual: f32| match variable(name) {
+            text if text.is_empty() => usual,
+            text => Some(number(&text))
+                .filter(|n| n.is_finite())
+                .unwrap_or(usual),
+        };
+        Usual {
+            pbr: or("r_pbr", 0.0) != 0.0,
+            gloss_type: GlossType::of_variable(&variable("r_glossType")),
+            normal: Vec2::new(or("r_baseNormalX", 1.0), or("r_baseNormalY", 1.0)),
+            depth: or("r_baseParallax", 0.05),
+            reflectance: or("r_baseSpecular", 0.04),
+            gloss: or("r_baseGloss", 0.3),
+        }
+    }
+}
 
 impl Materials {
     /// What packs state about a material that is drawn by `shader`. `exists`: whether there is an image of a name.
@@ -35,10 +75,18 @@ impl Materials {
             let name = format!("{}{suffix}", strip_extension(image?));
             (exists(&name) && !self.drawn().contains(&name.to_ascii_lowercase())).then_some(name)
         };
-        let normals = normals.map(|stage| NormalMap::downward(stage.image, stage.scale));
+        let usual = &self.usual;
+        let normals = normals.map(|stage| {
+            let scale = stage.scale.unwrap_or(usual.normal);
+            let depth = stage.depth.unwrap_or(usual.depth);
+            let depth = if stage.heights { depth } else { 0.0 };
+            NormalMap::downward(stage.image, scale, depth)
+        });
         let normals = normals.or_else(|| {
-            let image = NORMALS.iter().find_map(|suffix| beside(suffix))?;
-            Some(NormalMap::downward(image, Vec2::ONE))
+            let image = |&(suffix, heights)| Some((beside(suffix)?, heights));
+            let (image, heights) = NORMALS.iter().find_map(image)?;
+            let depth = if heights { usual.depth } else { 0.0 };
+            Some(NormalMap::downward(image, usual.normal, depth))
         });
         let mut finish = Finish {
             normals,
@@ -46,19 +94,19 @@ impl Materials {
         };
         let has_map = |specular: &SpecularStage| specular.image.is_some();
         match specular {
-            Some(specular) if has_map(&specular) => of_stage(&specular, &mut finish),
+            Some(specular) if has_map(&specular) => self.of_stage(&specular, &mut finish),
             specular => match beside(SPECULAR) {
                 Some(name) => {
                     let map = SpecularStage {
                         image: Some(name),
-                        metallic: self.pbr,
+                        metallic: usual.pbr,
                         ..SpecularStage::default()
                     };
-                    of_stage(&map, &mut finish);
+                    self.of_stage(&map, &mut finish);
                 }
                 None => {
                     if let Some(specular) = specular {
-                        of_words(&specular, &mut finish);
+                        self.of_words(&specular, &mut finish);
                     }
                 }
             },
@@ -81,6 +129,50 @@ impl Materials {
                 .collect()
         })
     }
+
+    /// A map and its factors; what is not stated is 1.
+    fn of_stage(&self, specular: &SpecularStage, finish: &mut Finish) {
+        let Some(image) = specular.image.clone() else {
+            return;
+        };
+        let gloss = specular.gloss.map_or(1.0, unit);
+        let scale = (gloss * 255.0).round() as u8;
+        let gloss_type = self.usual.gloss_type;
+        if specular.metallic {
+            finish.surface = Some(SurfaceMap::GlossMetal {
+                image,
+                scale,
+                gloss_type,
+            });
+            finish.metal = specular.metal.map(unit);
+            return;
+        }
+        finish.reflectance = specular.reflectance.map(units);
+        (finish.surface, finish.roughness) = match gloss_type {
+            GlossType::Smoothness => (Some(SurfaceMap::Specular(image)), Some(1.0 - gloss)),
+            _ => {
+                let map = SurfaceMap::Gloss {
+                    image,
+                    scale,
+                    gloss_type,
+                };
+                (Some(map), Some(0.0))
+            }
+        };
+    }
+
+    /// Words without a map; what is not stated is as `opengl2` has it.
+    fn of_words(&self, specular: &SpecularStage, finish: &mut Finish) {
+        let usual = &self.usual;
+        let gloss = specular.gloss.unwrap_or(usual.gloss);
+        finish.roughness = Some(unit(usual.gloss_type.roughness(gloss)));
+        if specular.metallic {
+            finish.metal = Some(unit(specular.metal.unwrap_or(0.0)));
+        } else {
+            let usual = Vec3::splat(usual.reflectance);
+            finish.reflectance = Some(units(specular.reflectance.unwrap_or(usual)));
+        }
+    }
 }
 
 /// The image of the first stage of colour.
@@ -92,34 +184,6 @@ fn first_image(shader: &Shader) -> Option<&str> {
             Some(name)
         }
         _ => None,
-    }
-}
-
-/// A map and its factors; what is not stated is 1.
-fn of_stage(specular: &SpecularStage, finish: &mut Finish) {
-    let Some(image) = specular.image.clone() else {
-        return;
-    };
-    let smoothness = specular.smoothness.unwrap_or(1.0);
-    if specular.metallic {
-        let scale = (unit(smoothness) * 255.0).round() as u8;
-        finish.surface = Some(SurfaceMap::SmoothnessMetal { image, scale });
-        finish.metal = specular.metal.map(unit);
-    } else {
-        finish.surface = Some(SurfaceMap::Specular(image));
-        finish.reflectance = specular.reflectance.map(units);
-        finish.roughness = Some(unit(1.0 - smoothness));
-    }
-}
-
-/// Words without a map; what is not stated is as `opengl2` has it.
-fn of_words(specular: &SpecularStage, finish: &mut Finish) {
-    finish.roughness = Some(unit(1.0 - specular.smoothness.unwrap_or(BASE_GLOSS)));
-    if specular.metallic {
-        finish.metal = Some(unit(specular.metal.unwrap_or(0.0)));
-    } else {
-        let usual = Vec3::splat(BASE_SPECULAR);
-        finish.reflectance = Some(units(specular.reflectance.unwrap_or(usual)));
     }
 }
 
@@ -163,11 +227,13 @@ mod tests {
         )]);
         assert_eq!(finish(&materials, "t/a", &[]), Finish::default());
         let both = finish(&materials, "t/a", &["t/a_n", "t/a_nh", "t/a_s"]);
-        assert_eq!(both.normals.unwrap().image, "t/a_nh");
+        let normals = both.normals.unwrap();
+        assert_eq!((normals.image.as_str(), normals.depth), ("t/a_nh", 0.05));
         assert_eq!(both.surface, Some(SurfaceMap::Specular("t/a_s".to_owned())));
         let images = ["t/wall_n", "t/b_n"];
         let of_script = finish(&materials, "t/b", &images).normals;
-        assert_eq!(of_script.unwrap().image, "t/wall_n");
+        let normals = of_script.unwrap();
+        assert_eq!((normals.image.as_str(), normals.depth), ("t/wall_n", 0.0));
         // images and names that scripts use are no maps
         assert_eq!(finish(&materials, "t/c", &["t/c_s"]), Finish::default());
         assert_eq!(finish(&materials, "t/d", &["t/d_n"]), Finish::default());
@@ -184,10 +250,11 @@ mod tests {
         let normals = NormalMap {
             image: "t/x".to_owned(),
             scale: Vec2::new(2.0, -2.0), // y of the map points down
+            depth: 0.0,
         };
         assert_eq!(a.normals, Some(normals));
         assert!((a.roughness.unwrap() - 0.2).abs() < 1e-6);
-        assert_eq!(a.reflectance, Some(Vec3::splat(BASE_SPECULAR)));
+        assert_eq!(a.reflectance, Some(Vec3::splat(0.04)));
         // what is drawn is the .shader's
         let drawn = replaced.library().find("t/a").unwrap();
         assert_eq!(drawn.image_names().collect::<Vec<_>>(), ["t/a"]);
@@ -206,5 +273,48 @@ mod tests {
         );
         assert_eq!(wrong.mtr_faults("t/b").count(), 1);
         assert_eq!(wrong.mtr_faults("t/c").count(), 0);
+    }
+
+    #[test]
+    fn variables_of_opengl2_state_what_materials_do_not() {
+        let text = "t/a\n{\n{\nmap t/a\nspecularReflectance 0.5\n}\n{\nstage normalParallaxMap\nmap t/x\n}\n}\nt/b\n{\n{\nmap t/b\nspecularReflectance 0.5\ngloss 0.5\n}\n{\nstage normalParallaxMap\nmap t/x\nnormalScale 1 1 0.2\n}\n}\n";
+        let mut materials = materials(&[("scripts/a.shader", text)]);
+        let a = finish(&materials, "t/a", &[]);
+        assert!((a.roughness.unwrap() - 0.7).abs() < 1e-6);
+        assert_eq!(
+            a.normals.map(|n| (n.scale.to_array(), n.depth)),
+            Some(([1.0, -1.0], 0.05))
+        );
+        let variable = |name: &str| {
+            let value = match name {
+                "r_glossType" => "0",
+                "r_baseNormalX" => "0.5",
+                "r_baseNormalY" => "2",
+                "r_baseParallax" => "0.1",
+                "r_baseGloss" => "1",
+                _ => "",
+            };
+            value.to_owned()
+        };
+        materials.usual = Usual::of_variables(&variable);
+        let a = finish(&materials, "t/a", &["t/a_s"]);
+        let map = SurfaceMap::Gloss {
+            image: "t/a_s".to_owned(),
+            scale: 255,
+            gloss_type: GlossType::Gloss,
+        };
+        assert_eq!((a.surface, a.roughness), (Some(map), Some(0.0)));
+        let a = finish(&materials, "t/a", &[]);
+        assert_eq!(a.roughness, Some(0.125));
+        assert_eq!(
+            a.normals.map(|n| (n.scale.to_array(), n.depth)),
+            Some(([0.5, -2.0], 0.1))
+        );
+        let b = finish(&materials, "t/b", &[]);
+        assert_eq!(b.roughness, Some(0.5_f32.powf(1.5)));
+        assert_eq!(
+            b.normals.map(|n| (n.scale.to_array(), n.depth)),
+            Some(([1.0, -1.0], 0.2))
+        );
     }
 }

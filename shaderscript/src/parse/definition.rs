@@ -8,6 +8,7 @@ use super::{
 };
 use crate::{
     diagnostic::Severity,
+    reflection::GlossType,
     shader::{Cull, Deform, Fog, Location, Shader, Sky, Sun, UnknownDirective, sort},
     stage::TcGen,
     surface_params::{CONTENTS_FOG, surface_param},
@@ -44,6 +45,8 @@ pub(super) struct DefinitionParser<'text, 'reporter, 'file> {
     pub(super) extended: bool,
     /// Words of reflection mean what they mean with `r_pbr 1`.
     pub(super) pbr: bool,
+    /// What a gloss means.
+    pub(super) gloss: GlossType,
     pub(super) variables: Variables<'text>,
     pub(super) chain: Chain,
 }
@@ -107,6 +110,7 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
             reports: 0,
             extended,
             pbr: number(&variables("r_pbr")) != 0.0,
+            gloss: GlossType::of_variable(&variables("r_glossType")),
             variables,
             chain: None,
         }

@@ -5,7 +5,7 @@ use super::{
     values::{destination_factor, lookup, source_factor},
 };
 use crate::{
-    reflection::{NormalStage, SpecularStage, smoothness_of_exponent},
+    reflection::{NormalStage, SpecularStage, roughness_of_exponent},
     stage::{AlphaFunc, AlphaGen, BlendFactor, DepthFunc, RgbGen, Stage, StageImage, TcGen, TcMod},
     token::{Token, number},
 };
@@ -36,7 +36,7 @@ struct Draft {
     /// A change that could not be read ends the list.
     tc_mods_ended: bool,
     kind: Kind,
-    normal_scale: Vec2,
+    normals: NormalStage,
     specular: SpecularStage,
 }
 
@@ -83,7 +83,7 @@ impl DefinitionParser<'_, '_, '_> {
             tc_mods: Vec::new(),
             tc_mods_ended: false,
             kind: Kind::Color,
-            normal_scale: Vec2::ONE,
+            normals: NormalStage::default(),
             specular: SpecularStage::default(),
         };
         loop {
@@ -176,8 +176,11 @@ impl DefinitionParser<'_, '_, '_> {
         };
         draft.kind = match kind.text.to_ascii_lowercase().as_str() {
             "diffusemap" => Kind::Color,
-            "normalmap" | "bumpmap" | "normalparallaxmap" | "bumpparallaxmap" => {
-                draft.normal_scale = Vec2::ONE;
+            word @ ("normalmap" | "bumpmap" | "normalparallaxmap" | "bumpparallaxmap") => {
+                draft.normals = NormalStage {
+                    heights: word.ends_with("parallaxmap"),
+                    ..NormalStage::default()
+                };
                 Kind::Normals
             }
             "specularmap" => {
@@ -199,11 +202,14 @@ impl DefinitionParser<'_, '_, '_> {
     }
 
     fn normal_scale(&mut self, draft: &mut Draft) {
-        // the third number scales heights
+        let normals = &mut draft.normals;
         match self.numbers()[..] {
             [] => self.warn("normalScale without a number"),
-            [both] => draft.normal_scale = Vec2::splat(both),
-            [x, y, ..] => draft.normal_scale = Vec2::new(x, y),
+            [both] => normals.scale = Some(Vec2::splat(both)),
+            [x, y, ref rest @ ..] => {
+                normals.scale = Some(Vec2::new(x, y));
+                normals.depth = rest.first().copied().or(normals.depth);
+            }
         }
     }
 
@@ -212,21 +218,21 @@ impl DefinitionParser<'_, '_, '_> {
         let specular = &mut draft.specular;
         match (numbers[..].as_ref(), self.pbr) {
             ([] | [_], _) => self.warn("specularScale needs at least two numbers"),
-            (&[metal, smoothness], true) => {
+            (&[metal, gloss], true) => {
                 specular.metal = Some(if metal < 0.5 { 0.0 } else { 1.0 });
-                specular.smoothness = Some(smoothness);
+                specular.gloss = Some(gloss);
             }
-            (&[smoothness, metal, ..], true) => {
-                specular.smoothness = Some(smoothness);
+            (&[gloss, metal, ..], true) => {
+                specular.gloss = Some(gloss);
                 specular.metal = Some(metal);
             }
-            (&[all, smoothness], false) => {
+            (&[all, gloss], false) => {
                 specular.reflectance = Some(Vec3::splat(all));
-                specular.smoothness = Some(smoothness);
+                specular.gloss = Some(gloss);
             }
             (&[r, g, b, ref rest @ ..], false) => {
                 specular.reflectance = Some(Vec3::new(r, g, b));
-                specular.smoothness = rest.first().copied().or(specular.smoothness);
+                specular.gloss = rest.first().copied().or(specular.gloss);
             }
         }
     }
@@ -238,17 +244,17 @@ impl DefinitionParser<'_, '_, '_> {
             return;
         };
         let specular = &mut draft.specular;
+        let mut gloss_of = |roughness: f32| specular.gloss = Some(self.gloss.gloss(roughness));
         match word {
             "specularreflectance" if self.pbr => {
                 specular.metal = Some(if value < 0.5 { 0.0 } else { 1.0 });
             }
             "specularreflectance" => specular.reflectance = Some(Vec3::splat(value)),
-            "specularexponent" => specular.smoothness = Some(smoothness_of_exponent(value)),
-            "gloss" if self.pbr => specular.smoothness = Some(1.0 - (-3.0 * value).exp2()),
-            "gloss" => specular.smoothness = Some(value),
-            "roughness" => specular.smoothness = Some(1.0 - value),
-            // parallaxDepth: heights are not used
-            _ => {}
+            "specularexponent" => gloss_of(roughness_of_exponent(value)),
+            "gloss" if self.pbr => gloss_of((-3.0 * value).exp2()),
+            "gloss" => specular.gloss = Some(value),
+            "roughness" => gloss_of(value),
+            _ => draft.normals.depth = Some(value),
         }
     }
 
@@ -498,7 +504,7 @@ impl DefinitionParser<'_, '_, '_> {
             Kind::Normals => {
                 return Some(Read::Normals(NormalStage {
                     image: image.names().first()?.clone(),
-                    scale: draft.normal_scale,
+                    ..draft.normals
                 }));
             }
             Kind::Specular => {
