@@ -63,34 +63,23 @@ fn expected(y: f32, z: f32, normals: bool, highlights: bool) -> f32 {
 
 /// An uncompressed TGA image of one pixel.
 fn pixel(rgba: [u8; 4]) -> Vec<u8> {
-    let mut tga = vec![0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 32, 8];
-    tga.extend([rgba[2], rgba[1], rgba[0], rgba[3]]);
+    square(1, |_, _| rgba)
+}
+
+/// The same of `side` x `side` pixels, from the bottom.
+fn square(side: u8, rgba: impl Fn(u8, u8) -> [u8; 4]) -> Vec<u8> {
+    let mut tga = vec![0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, side, 0, side, 0, 32, 8];
+    for (y, x) in (0..side).flat_map(|y| (0..side).map(move |x| (y, x))) {
+        let [red, green, blue, alpha] = rgba(x, y);
+        tga.extend([blue, green, red, alpha]);
+    }
     tga
 }
 
 fn files() -> MemoryFiles {
-    let mut map = MapBuilder::new();
-    let (other, wall) = (
-        map.add_shader("t/other", 0, 0),
-        map.add_shader("t/wall", 0, 0),
-    );
-    map.add_room(other, Vec3::splat(-WALL - 64.0), Vec3::splat(WALL + 64.0));
-    let corners = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
-    let surface = map.add_quad(wall, corners.map(|(y, z)| Vec3::new(1.0, y, z) * WALL));
-    for vertex in map.vertices_mut(surface) {
-        vertex.st = Vec2::new(-vertex.position.y, -vertex.position.z) / 64.0;
-    }
-    let page = map.add_lightmap([BAKED; 3]);
-    map.set_lightmap(surface, page);
-    let bsp = map.build_with_grid(Vec3::splat(64.0), |_| GridPoint {
-        ambient: [20; 3],
-        directed: [200; 3],
-        longitude: ANGLES[0],
-        latitude: ANGLES[1],
-    });
     let mut files = MemoryFiles::new();
     let [red, green, blue] = NORMAL;
-    files.insert("maps/t.bsp", bsp.write()).unwrap();
+    files.insert("maps/t.bsp", wall(1.0 / 64.0)).unwrap();
     files
         .insert("t/wall.tga", pixel([TEXTURE, TEXTURE, TEXTURE, 255]))
         .unwrap();
@@ -101,6 +90,30 @@ fn files() -> MemoryFiles {
         .insert("t/wall_s.tga", pixel([GREY, GREY, GREY, SMOOTHNESS]))
         .unwrap();
     files
+}
+
+/// A map with a wall before the camera. `scale`: texture coordinates for each unit.
+fn wall(scale: f32) -> Vec<u8> {
+    let mut map = MapBuilder::new();
+    let (other, wall) = (
+        map.add_shader("t/other", 0, 0),
+        map.add_shader("t/wall", 0, 0),
+    );
+    map.add_room(other, Vec3::splat(-WALL - 64.0), Vec3::splat(WALL + 64.0));
+    let corners = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
+    let surface = map.add_quad(wall, corners.map(|(y, z)| Vec3::new(1.0, y, z) * WALL));
+    for vertex in map.vertices_mut(surface) {
+        vertex.st = Vec2::new(-vertex.position.y, -vertex.position.z) * scale;
+    }
+    let page = map.add_lightmap([BAKED; 3]);
+    map.set_lightmap(surface, page);
+    let bsp = map.build_with_grid(Vec3::splat(64.0), |_| GridPoint {
+        ambient: [20; 3],
+        directed: [200; 3],
+        longitude: ANGLES[0],
+        latitude: ANGLES[1],
+    });
+    bsp.write()
 }
 
 /// Red of the picture with these settings, row by row from the top.
@@ -199,4 +212,72 @@ fn files_of_materials_are_read_again() {
         of_pack[0].abs_diff(of_line[0]) > 20,
         "{of_pack:?} {of_line:?}"
     );
+}
+
+/// Depth of the heights, and the alpha that they have everywhere.
+const DEPTH: f32 = 0.25;
+const HEIGHT: u8 = 128;
+
+/// The wall with a texture of waves and heights. `stage`: how the script names the normal map.
+fn waves(scale: f32, stage: &str) -> MemoryFiles {
+    let mut files = MemoryFiles::new();
+    files.insert("maps/t.bsp", wall(scale)).unwrap();
+    let wave = |x: u8, y: u8| {
+        let [x, y] = [x, y].map(|place| f32::from(place) * TAU / 64.0);
+        (128.0 + 100.0 * (x * 2.0).sin() * (y * 3.0).cos()) as u8
+    };
+    let waves = square(64, |x, y| [wave(x, y), 0, 0, 255]);
+    files.insert("t/wall.tga", waves).unwrap();
+    (files.insert("t/heights.tga", pixel([128, 128, 255, HEIGHT]))).unwrap();
+    (files.insert("t/flat.tga", pixel([128, 128, 255, 255]))).unwrap();
+    let script = format!(
+        "t/wall\n{{\n{{\nmap t/wall\n}}\n{{\n{stage}\nparallaxDepth {DEPTH}\n}}\n{{\nmap $lightmap\nblendFunc filter\n}}\n}}\n"
+    );
+    files.insert("scripts/t.shader", script).unwrap();
+    files
+}
+
+#[test]
+fn heights_move_the_texture_as_a_wall_farther_away_would_show_it() {
+    let options = RendererOptions {
+        validation: true,
+        ..RendererOptions::headless(SIDE as u32, SIDE as u32)
+    };
+    let Some(mut renderer) = testkit::device(Renderer::new(options)) else {
+        return;
+    };
+    let mut draw = |parallax_mapping, scale, stage: &str| {
+        let settings = Settings {
+            normal_mapping: true,
+            parallax_mapping,
+            map_overbright_bits: 0,
+            ..Settings::full_size()
+        };
+        load(&mut renderer, Arc::new(waves(scale, stage)), &settings);
+        shown(&mut renderer)
+    };
+    let greatest = |a: &[u8], b: &[u8]| {
+        let pairs = a.iter().zip(b);
+        pairs.map(|(a, b)| a.abs_diff(*b)).max().unwrap()
+    };
+    let heights = "stage normalParallaxMap\nmap t/heights";
+    let (scale, below) = (1.0 / 512.0, 1.0 - byte(HEIGHT));
+    let plain = draw(0, scale, heights);
+    // `r_parallaxMapping 1` adds a step of 1/16
+    for (mode, depth) in [(1, below + 1.0 / 16.0), (2, below)] {
+        let moved = draw(mode, scale, heights);
+        let farther = draw(0, scale + depth * DEPTH / WALL, heights);
+        assert!(greatest(&plain, &moved) > 20, "{mode}");
+        let error = greatest(&farther, &moved);
+        assert!(error <= 3, "{mode}: {error}");
+    }
+    // maps without heights, and stages that state none
+    for stage in [
+        "stage normalParallaxMap\nmap t/flat",
+        "stage normalMap\nmap t/heights",
+    ] {
+        assert_eq!(draw(2, scale, stage), plain, "{stage}");
+    }
+    let messages = renderer.validation_messages();
+    assert!(messages.is_empty(), "validation: {messages:#?}");
 }

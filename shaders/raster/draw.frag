@@ -33,6 +33,10 @@ float shadow = 0.0;          // part of the light that rays found missing
 vec4 reflection = vec4(0.0); // see `hybrid_reflection`
 #endif
 
+#ifdef SURFACE_MAPPING
+vec2 height_shift = vec2(0.0); // of the coordinates of the texture whose normal map has heights
+#endif
+
 // The indices are dynamically uniform within a draw and need no `nonuniformEXT`.
 vec4 sample_stage(uint stage) {
     if ((TEXTURES >> stage & 1) == 0) return vec4(1.0);
@@ -42,6 +46,9 @@ vec4 sample_stage(uint stage) {
     uint handle = in_textures[stage];
 #endif
     vec2 uv = (stage & 1) == 0 ? in_uv[stage / 2].xy : in_uv[stage / 2].zw;
+#ifdef SURFACE_MAPPING
+    if ((MAPPING & MAPPING_HEIGHTS) != 0 && stage == TEXTURE_STAGE) uv += height_shift;
+#endif
 #ifdef HYBRID
     if ((MIRRORED >> stage & 1) != 0 && reflection.a > 0.0) {
         vec4 image = texture(sampler2D(textures[handle & 0xFFFFFF], samplers[handle >> 24]), uv);
@@ -161,6 +168,9 @@ void main() {
     } else if (MODE == DRAW_FOG) {
         out_color = vec4(in_flat_color[0].rgb, sample_stage(0).a);
     } else {
+#ifdef SURFACE_MAPPING
+        if ((MAPPING & MAPPING_HEIGHTS) != 0) height_shift = shift_by_heights();
+#endif
         out_color = stage_value(0);
         if (!passes_alpha_test(0, out_color)) discard;
 #ifdef MANY_STAGES

@@ -1,5 +1,6 @@
 // Normal and specular mapping of a draw, under the baked light of a surface or the light of the grid on a model.
-// Source: `lightall_fp.glsl` and `lightall_vp.glsl` of ioquake3's `opengl2`, without cube maps and parallax.
+// Source: `lightall_fp.glsl` and `lightall_vp.glsl` of ioquake3's `opengl2`, without cube maps.
+#include "common/heights.glsl"
 
 // Part of the baked light that has the direction of `in_light`; the rest has none.
 const float DIRECTED_PART = 0.75;
@@ -12,15 +13,47 @@ const float LEAST_ROUGHNESS = 0.05;
 
 vec2 texture_uv() { return (TEXTURE_STAGE & 1) == 0 ? in_uv[TEXTURE_STAGE / 2].xy : in_uv[TEXTURE_STAGE / 2].zw; }
 
-vec4 map_texel(uint map, uint map_sampler) { return texture(sampler2D(textures[map], samplers[map_sampler]), texture_uv()); }
+vec4 map_texel(uint map, uint map_sampler) {
+    vec2 uv = texture_uv();
+    if ((MAPPING & MAPPING_HEIGHTS) != 0) uv += height_shift;
+    return texture(sampler2D(textures[map], samplers[map_sampler]), uv);
+}
 
-// The mapped normal. Tangents are those of the vertices, or else those of the triangle.
-vec3 mapped_normal(Specular specular, vec3 normal, vec3 to_viewer) {
+vec3 vector_to_viewer() { return vec3(in_normal.w, in_tangent.w, in_light.w); }
+
+// The interpolated normal, on the side that is seen.
+vec3 flat_normal_of(vec3 to_viewer, vec3 view) {
+    vec3 face = cross(dFdx(to_viewer), dFdy(to_viewer));
+    if (dot(face, view) < 0.0) face = -face;
+    vec3 flat_normal = safe_normalize(in_normal.xyz, safe_normalize(face, view));
+    return dot(flat_normal, face) < 0.0 ? -flat_normal : flat_normal;
+}
+
+// Tangent of the vertices, or else of the triangle, and `along_t`: where t grows.
+vec3 tangent_of(vec3 to_viewer, out vec3 along_t) {
     vec3 px = -dFdx(to_viewer), py = -dFdy(to_viewer);
     vec2 sx = dFdx(texture_uv()), sy = dFdy(texture_uv());
     float turn = sign(sx.x * sy.y - sx.y * sy.x);
-    vec3 along_s = (px * sy.y - py * sx.y) * turn, along_t = (py * sx.x - px * sy.x) * turn;
-    vec3 tangent = in_tangent.xyz == vec3(0.0) ? along_s : in_tangent.xyz;
+    vec3 along_s = (px * sy.y - py * sx.y) * turn;
+    along_t = (py * sx.x - px * sy.x) * turn;
+    return in_tangent.xyz == vec3(0.0) ? along_s : in_tangent.xyz;
+}
+
+// How far the heights of the normal map move the texture.
+vec2 shift_by_heights() {
+    Specular specular = Materials(VIEW.materials.materials).at[Draws(VIEW.draws).at[in_textures.x].material].specular;
+    vec3 to_viewer = vector_to_viewer(), along_t;
+    vec3 view = safe_normalize(to_viewer, vec3(0.0, 0.0, 1.0));
+    vec3 tangent = tangent_of(to_viewer, along_t);
+    vec2 slope = height_slope(view, flat_normal_of(to_viewer, view), tangent, along_t, specular.depth);
+    uint map = specular.normals, map_sampler = specular.sampler_index;
+    float lod = textureQueryLod(sampler2D(textures[map], samplers[map_sampler]), texture_uv()).y;
+    return height_offset(map, map_sampler, texture_uv(), slope, max(lod, 0.0), (MAPPING & MAPPING_RELIEF) != 0);
+}
+
+vec3 mapped_normal(Specular specular, vec3 normal, vec3 to_viewer) {
+    vec3 along_t;
+    vec3 tangent = tangent_of(to_viewer, along_t);
     vec2 texel = map_texel(specular.normals, specular.sampler_index).xy;
     return normal_from_map(normal, tangent, along_t, texel, specular.normal_scale);
 }
@@ -60,13 +93,9 @@ vec4 mapped_color(vec4 color) {
     Draws draws = Draws(VIEW.draws);
     uint draw = in_textures.x;
     Material material = Materials(VIEW.materials.materials).at[draws.at[draw].material];
-    vec3 to_viewer = vec3(in_normal.w, in_tangent.w, in_light.w);
+    vec3 to_viewer = vector_to_viewer();
     vec3 view = safe_normalize(to_viewer, vec3(0.0, 0.0, 1.0));
-    // of both sides of a surface, the one that is seen
-    vec3 face = cross(dFdx(to_viewer), dFdy(to_viewer));
-    if (dot(face, view) < 0.0) face = -face;
-    vec3 flat_normal = safe_normalize(in_normal.xyz, safe_normalize(face, view));
-    if (dot(flat_normal, face) < 0.0) flat_normal = -flat_normal;
+    vec3 flat_normal = flat_normal_of(to_viewer, view);
     vec3 light = safe_normalize(in_light.xyz, flat_normal);
     vec3 normal = (MAPPING & MAPPING_NORMALS) == 0 ? flat_normal : mapped_normal(material.specular, flat_normal, to_viewer);
     float incidence = clamp(dot(normal, light), 0.0, 1.0);

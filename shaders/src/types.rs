@@ -153,6 +153,8 @@ pub struct Specular {
     pub stage: u32,
     /// Factors of the normals' first two components; the third completes them to unit length.
     pub normal_scale: Vec2,
+    /// Depth of the normal map's alpha of 0 below one of 1, in texture coordinates. Of `MATERIAL_HEIGHTS` alone.
+    pub depth: f32,
     /// Part of the light that the surface mirrors sharply, beside its stages.
     pub mirror: Vec3,
 }

@@ -128,13 +128,17 @@ vec4 stage_texel(Stage stage, SurfacePoint p, Instance instance, Footprint footp
     return texel_mean(image, stage.sampler_index, uv, lookups);
 }
 
+// Texture coordinates of a material's maps: those of its texture.
+vec2 map_texcoord(Specular specular, SurfacePoint p, out mat2 jacobian) {
+    jacobian = mat2(1.0);
+    if (specular.stage == NO_STAGE) return p.stage.st;
+    return stage_texcoord(VIEW.materials, Stages(VIEW.materials.stages).at[specular.stage], instance_of(p.instance), p.stage, jacobian);
+}
+
 // A map of a material at the point, where the material's texture is.
 vec4 map_texel(Specular specular, uint map, SurfacePoint p, Footprint footprint) {
-    vec2 uv = p.stage.st;
-    mat2 jacobian = mat2(1.0);
-    if (specular.stage != NO_STAGE) {
-        uv = stage_texcoord(VIEW.materials, Stages(VIEW.materials.stages).at[specular.stage], instance_of(p.instance), p.stage, jacobian);
-    }
+    mat2 jacobian;
+    vec2 uv = map_texcoord(specular, p, jacobian);
     float scale = p.texel_scale * sqrt(abs(determinant(jacobian)));
     return texel_mean(map, specular.sampler_index, uv, Lookups(vec2(0.0), 1.0, texture_lod(map, scale, footprint.width)));
 }

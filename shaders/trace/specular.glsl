@@ -6,10 +6,13 @@
 #ifndef RELIGHT_TRACE_SPECULAR_GLSL
 #define RELIGHT_TRACE_SPECULAR_GLSL
 
+#include "common/heights.glsl"
 #include "trace/layer.glsl"
 
 // 1: materials reflect by their roughness. 0 removes the code.
 layout(constant_id = 3) const uint HAS_GLOSS = 0;
+// 1: heights of normal maps move the textures that rays of sight meet.
+layout(constant_id = 20) const uint HAS_HEIGHTS = 0;
 
 // Specular reflection at a point. `reflectance`: at normal incidence; `alpha`: width of the distribution, 0: none.
 struct Gloss {
@@ -159,6 +162,22 @@ vec3 surface_tangent(SurfacePoint p, out vec3 along_t) {
         if (tangent != vec3(0.0)) return axis * tangent;
     }
     return (ab * sc.y - ac * sb.y) * turn;
+}
+
+// Moves the texture coordinates of a point of the map to the place where a ray of sight meets the heights of its normal map.
+void move_by_heights(inout SurfacePoint p, Material material, Footprint footprint, vec3 direction) {
+    if (HAS_HEIGHTS == 0 || (material.flags & MATERIAL_HEIGHTS) == 0 || (p.triangle.flags & TRIANGLE_STATIC) == 0) return;
+    Specular specular = material.specular;
+    vec3 along_t;
+    vec3 tangent = surface_tangent(p, along_t);
+    vec3 normal = dot(p.normal, direction) > 0.0 ? -p.normal : p.normal;
+    vec2 slope = height_slope(-direction, normal, tangent, along_t, specular.depth);
+    mat2 jacobian;
+    vec2 uv = map_texcoord(specular, p, jacobian);
+    float area = determinant(jacobian);
+    float lod = texture_lod(specular.normals, p.texel_scale * sqrt(abs(area)), footprint.width);
+    vec2 shift = height_offset(specular.normals, specular.sampler_index, uv, slope, lod, (VIEW.flags & VIEW_RELIEF) != 0);
+    if (area != 0.0) p.stage.st += inverse(jacobian) * shift;
 }
 
 // The shading normal of a point, on the side of its face: from the normal map, if the material has one.

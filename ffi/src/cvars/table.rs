@@ -60,7 +60,7 @@ cvars! {
     MaxPolys: Whole = "r_maxpolys", "600", NONE, None, "Polygons in a frame. There is no limit here; kept for old configurations.";
     MaxPolyVerts: Whole = "r_maxpolyverts", "3000", NONE, None, "Polygon corners in a frame. There is no limit here; kept for old configurations.";
     DebugSurface: Whole = "r_debugSurface", "0", CHEAT, None, "1 shows collision surfaces that traces hit, higher values the bots' navigation areas. In the classic look.";
-    Device: Text = "r_device", "", ARCHIVE | LATCH, None, "Part of the name of the Vulkan device to use, or its number; empty or -1 takes the best.";
+    Device: Text = "r_device", "", ARCHIVE | LATCH, None, "Part of the Vulkan device's name, or its number; empty or -1 takes the best.";
     VkValidation: Whole = "r_vkValidation", "0", LATCH, kept(0.0, 1.0), "1 loads the Vulkan validation layer and prints what it finds.";
     Headless: Whole = "r_headless", "0", LATCH, kept(0.0, 1.0), "1 renders without a window, for tests.";
 }

@@ -61,6 +61,12 @@ impl Materials {
         self.list.iter().any(has)
     }
 
+    /// Whether a normal map has heights.
+    pub fn has_heights(&self) -> bool {
+        let has = |material: &Material| material.flags & c::MATERIAL_HEIGHTS != 0;
+        self.list.iter().any(has)
+    }
+
     /// Whether a rough material reflects more than [`LITTLE`] at normal incidence.
     pub fn has_metal(&self) -> bool {
         self.list.iter().any(|material| material.metallic)
@@ -145,10 +151,11 @@ fn apply(
         let map = (finish.surface.as_ref()).and_then(|map| source.surface_map(map));
         let normals = (finish.normals.as_ref())
             .and_then(|map| Some(source.image(&map.image, ImageFlags::DATA)?.0));
-        let mean = normals.map(|image| source.mean(image).truncate());
+        let mean = normals.map(|image| source.mean(image));
         let checks = [
             finish.check_surface(map.is_some()),
-            finish.check_normals(mean),
+            finish.check_normals(mean.map(|mean| mean.truncate())),
+            finish.check_heights(mean.map(|mean| mean.w)),
         ];
         let name = &material.name;
         let checks = checks.into_iter().filter_map(Result::err);
@@ -175,6 +182,10 @@ fn apply(
             flags |= c::MATERIAL_NORMALS;
             specular.normals = normals;
             specular.normal_scale = map.scale;
+            if map.depth != 0.0 {
+                flags |= c::MATERIAL_HEIGHTS;
+                specular.depth = map.depth;
+            }
         }
         specular.sampler_index = sampler::REPEAT_MIP;
     }

@@ -13,6 +13,8 @@ pub struct SurfaceMapping {
     pub normals: bool,
     /// Roughness, metal and reflectance (`r_specularMapping`).
     pub highlights: bool,
+    /// `MAPPING_*` of surfaces whose normal map has heights (`r_parallaxMapping`).
+    pub heights: u32,
 }
 
 impl SurfaceMapping {
@@ -21,6 +23,13 @@ impl SurfaceMapping {
         Self {
             normals: settings.normal_mapping,
             highlights: settings.specular_mapping,
+            heights: match settings.parallax_mapping {
+                // as in `opengl2`, none without normal maps
+                0 => 0,
+                _ if !settings.normal_mapping => 0,
+                1 => c::MAPPING_HEIGHTS,
+                _ => c::MAPPING_HEIGHTS | c::MAPPING_RELIEF,
+            },
         }
     }
 
@@ -58,7 +67,12 @@ impl SurfaceMapping {
             TextureLight::Vertices => (c::MAPPING_BAKED, 0),
             TextureLight::Grid => (c::MAPPING_OF_GRID, 0),
         };
+        // they move textures of the map alone
+        let heights = match source {
+            c::MAPPING_BAKED if material.flags & c::MATERIAL_HEIGHTS != 0 => self.heights,
+            _ => 0,
+        };
         let places = texture << c::MAPPING_TEXTURE_SHIFT | light << c::MAPPING_LIGHT_SHIFT;
-        Some(maps | source | places)
+        Some(maps | source | places | heights)
     }
 }

@@ -120,6 +120,8 @@ pub struct MapNeeds {
     pub bodies: bool,
     /// Materials other than glass are rough or have normal maps.
     pub gloss: bool,
+    /// Normal maps have heights.
+    pub heights: bool,
     /// Materials are rough, glass included, or have normal maps.
     pub frosted: bool,
     /// A rough material reflects more than most that are no metal.
@@ -142,6 +144,9 @@ fn states(pass: Pass, settings: &Settings, needs: MapNeeds) -> Vec<usize> {
             Switch::Bounces => settings.rt_bounces > 0,
             Switch::MapFog | Switch::LitFog => needs.fog,
             Switch::Gloss => needs.has_gloss(settings),
+            Switch::Heights => {
+                needs.heights && settings.rt_specular && settings.parallax_mapping > 0
+            }
             Switch::Caustics => needs.bodies && photons::in_use(settings),
             Switch::Timed => false,
             Switch::BlueNoise => settings.rt_blue_noise,

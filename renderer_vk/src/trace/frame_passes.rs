@@ -30,6 +30,8 @@ pub struct FrameFacts {
     pub bounces: bool,
     /// Materials are rough or have normal maps.
     pub gloss: bool,
+    /// Heights of normal maps move textures.
+    pub heights: bool,
     /// The time of pixels is measured.
     pub timed: bool,
     /// Random numbers of light are blue noise over the picture.
@@ -67,6 +69,7 @@ impl FrameFacts {
             Switch::MapFog => self.map_fog,
             Switch::Bounces => self.bounces,
             Switch::Gloss => self.gloss,
+            Switch::Heights => self.heights,
             Switch::ScreenHits => self.screen,
             Switch::Adaptive => self.adaptive,
             Switch::Roulette => self.roulette,

@@ -106,6 +106,10 @@ pub trait MaterialTable {
     fn has_metal(&self) -> bool {
         false
     }
+    /// Whether normal maps have heights.
+    fn has_heights(&self) -> bool {
+        false
+    }
     /// Alpha coverage of a triangle by its texture coordinates.
     fn coverage(&self, _material: u32, _corners: [Vec2; 3]) -> Coverage {
         Coverage::Mixed

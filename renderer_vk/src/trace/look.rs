@@ -79,6 +79,10 @@ impl MaterialTable for Assets {
         self.materials.has_metal()
     }
 
+    fn has_heights(&self) -> bool {
+        self.materials.has_heights()
+    }
+
     fn sky_sampler(&self) -> u32 {
         self.samplers.index(sampler::CLAMP_MIP)
     }
@@ -285,6 +289,7 @@ impl TraceLook {
             mirrors: self.geometry.mirrors.count(true, None) > 0,
             bodies: !self.geometry.bodies.is_empty(),
             gloss: assets.materials.has_gloss(false),
+            heights: assets.materials.has_heights(),
             frosted: assets.materials.has_gloss(true),
             metal: assets.materials.has_metal(),
         }

@@ -61,6 +61,8 @@ pub enum Switch {
     Bounces,
     /// Materials are rough or have normal maps.
     Gloss,
+    /// Heights of normal maps move textures (`r_parallaxMapping`).
+    Heights,
     /// Photons bring the light that crosses refracting bodies.
     Caustics,
     /// A view of `rt_debug` shows the time of pixels.
@@ -149,7 +151,7 @@ macro_rules! passes {
         /// Declarations, in the order of [`Pass`].
         pub static TABLE: &[Row] = {
             #[allow(clippy::enum_glob_use)] // rows name many of them
-            use {Resource::*, Shader::{Compute, Rays}, Switch::{Adaptive, BlueNoise, Bounces, Caustics, CutOuts, Feedback, Gloss, LightTree, LitFog, MapFog, Roulette, SharedEyes, Timed, VertexLight}};
+            use {Resource::*, Shader::{Compute, Rays}, Switch::{Adaptive, BlueNoise, Bounces, Caustics, CutOuts, Feedback, Gloss, Heights, LightTree, LitFog, MapFog, Roulette, SharedEyes, Timed, VertexLight}};
             &[$(Row { $($field: $value,)* ..Row::of(concat!($($about),+), $name, $shader, Size::$size) }),+]
         };
     };
@@ -171,14 +173,14 @@ passes! {
     }
     /// `Primary` compiled without rays: finishes the many pixels that show the surface of their first hit.
     PrimarySimple = "trace_primary_simple", Compute(&shaders::TRACE_PRIMARY_RGEN_NO_RAYS), Traced {
-        switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed)],
+        switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss), (ids::specular::HAS_HEIGHTS, Heights), (ids::clock::TIMED, Timed)],
         reads: &[Scene, PrimaryHits],
         writes: &[GBuffer, Positions, Normals, Shown, FogWeights, FogPoints, GlossSurfaces],
     }
     /// The surface that each other pixel shows behind mirrors, portals, glass and liquids, with the layers in front of
     /// it.
     Primary = "trace_primary", Rays(&shaders::TRACE_PRIMARY), Traced {
-        switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed), (ids::feedback::HIT_FEEDBACK, Feedback)],
+        switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss), (ids::specular::HAS_HEIGHTS, Heights), (ids::clock::TIMED, Timed), (ids::feedback::HIT_FEEDBACK, Feedback)],
         reads: &[Scene, PrimaryHits],
         writes: &[GBuffer, Positions, Normals, Shown, FogWeights, FogPoints, GlossSurfaces],
         counter: Some(t::COUNT_PRIMARY),
@@ -186,7 +188,7 @@ passes! {
     /// The side of glass or of a glossy surface that a pixel does not show.
     OtherSide = "trace_other_side", Rays(&shaders::TRACE_PRIMARY), Traced {
         shares: Some(Pass::Primary),
-        switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss), (ids::clock::TIMED, Timed), (ids::feedback::HIT_FEEDBACK, Feedback)],
+        switches: &[(ids::fog_keep::LIT_FOG, LitFog), (ids::specular::HAS_GLOSS, Gloss), (ids::specular::HAS_HEIGHTS, Heights), (ids::clock::TIMED, Timed), (ids::feedback::HIT_FEEDBACK, Feedback)],
         reads: &[Scene, PrimaryHits, GBuffer],
         writes: &[Other],
     }
@@ -450,7 +452,7 @@ passes! {
     }
     /// More samples of the pixels that have no history (`rt_taaRays`).
     MoreSamples = "trace_more_samples", Rays(&shaders::TRACE_MORE_SAMPLES), Traced {
-        switches: &[(ids::specular::HAS_GLOSS, Gloss)],
+        switches: &[(ids::specular::HAS_GLOSS, Gloss), (ids::specular::HAS_HEIGHTS, Heights)],
         reads: &[Scene, GBuffer, DirectLight, Picture],
         may_read: &[IndirectLight],
         writes: &[MoreSamples],

@@ -298,7 +298,8 @@ impl ViewTracer {
         }
         let params = self.prepare(targets, rec, view, output)?;
         targets.indirect_is_black &= settings.rt_bounces == 0;
-        self.record_passes(targets, rec, settings, output, &params)?;
+        let has_heights = settings.parallax_mapping > 0 && view.materials.has_heights();
+        self.record_passes(targets, rec, settings, output, &params, has_heights)?;
         self.frame = self.frame.wrapping_add(1);
         self.last_time = view.scene.time;
         self.history = (!settings.rt_accumulate).then(|| camera_frame(view.scene));
@@ -407,9 +408,11 @@ impl ViewTracer {
         settings: &Settings,
         output: [u32; 2],
         params: &TraceView,
+        has_heights: bool,
     ) -> Result<(), Error> {
         let address = rec.arena().push(std::slice::from_ref(params))?;
-        let facts = self.facts(targets, settings, output, params);
+        let mut facts = self.facts(targets, settings, output, params);
+        facts.heights = facts.gloss && has_heights;
         let passes = &mut FramePasses::new(&self.passes, rec, address, facts);
         if self.first_hits.is_on() {
             let drawn = self.accel.drawn();
@@ -480,6 +483,7 @@ impl ViewTracer {
             map_fog: params.scene.fog_count > 0,
             bounces: settings.rt_bounces > 0,
             gloss: targets.specular.is_some(),
+            heights: false,
             timed: self.pixel_times.are_shown(),
             blue_noise: settings.rt_blue_noise,
             screen: self.screen.is_known(),

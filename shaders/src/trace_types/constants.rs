@@ -116,6 +116,8 @@ pub const VIEW_HISTORY: u32 = 128;
 pub const VIEW_DENOISE: u32 = 256;
 /// One of each 2 × 2 pixels gathers bounced light, alternating over frames.
 pub const VIEW_SUBSAMPLED_BOUNCE: u32 = 512;
+/// Rays of sight meet heights by halved steps (`r_parallaxMapping 2`).
+pub const VIEW_RELIEF: u32 = 1024;
 
 /// Of this many invocations one counts the boxes on its rays, for `rt_hitFeedback`.
 pub const FEEDBACK_RAYS: u32 = 16;

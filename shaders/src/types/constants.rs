@@ -122,6 +122,8 @@ pub const MATERIAL_CLEAR: u32 = 262144;
 pub const MATERIAL_GLOWS: u32 = 1048576;
 /// Its map has reflectance and smoothness, not roughness and metal.
 pub const MATERIAL_SPECULAR_MAP: u32 = 524288;
+/// Its normal map has heights.
+pub const MATERIAL_HEIGHTS: u32 = 2097152;
 
 /// Drawn in front of everything near (first-person weapon).
 pub const INSTANCE_DEPTH_HACK: u32 = 1;
@@ -167,7 +169,7 @@ pub const COLOR_VERTEX: u32 = 2;
 
 /// Normal and specular mapping of a draw: source of the light (lowest bits; 0: no mapping), whether there are a normal map
 /// and a highlight, and the shifts to 4 bits each for the stage with the texture and for that with the light, plus one; 0:
-/// the texture's stage has the light as its colour.
+/// the texture's stage has the light as its colour. Whether the normal map's heights move the texture, and by halved steps.
 pub const MAPPING_BAKED: u32 = 1;
 pub const MAPPING_OF_GRID: u32 = 2;
 pub const MAPPING_SOURCE: u32 = 3;
@@ -175,6 +177,8 @@ pub const MAPPING_NORMALS: u32 = 4;
 pub const MAPPING_SPECULAR: u32 = 8;
 pub const MAPPING_TEXTURE_SHIFT: u32 = 4;
 pub const MAPPING_LIGHT_SHIFT: u32 = 8;
+pub const MAPPING_HEIGHTS: u32 = 4096;
+pub const MAPPING_RELIEF: u32 = 8192;
 
 pub const FOG_ADJUST_NONE: u32 = 0;
 pub const FOG_ADJUST_RGB: u32 = 1;

@@ -91,17 +91,23 @@ fn packs_state_reflection_in_words_of_opengl2() {
         ("t/plain_s.tga", PIXEL),
         ("t/grey.tga", PIXEL),
         ("t/grey_n.tga", PIXEL),
+        ("t/high.tga", PIXEL),
+        ("t/high_nh.tga", BLUE),
     ]);
     let find = |game: &mut Registration, name| game.find(name, LightmapClass::Page, true);
-    let [wall, pane, plain, grey] =
-        ["t/wall", "t/pane", "t/plain", "t/grey"].map(|name| find(&mut game, name));
+    let [wall, pane, plain, grey, high] =
+        ["t/wall", "t/pane", "t/plain", "t/grey", "t/high"].map(|name| find(&mut game, name));
     assert!(!game.materials.has_gloss(true), "before a traced view");
     assert_eq!(game.textures.index("t/plain_n"), None);
-    let faults = (game.materials).set_by_hand(MaterialsByHand::default(), &mut game.textures);
-    assert_eq!(faults.len(), 1, "{faults:?}");
-    assert!(faults[0].contains("t/grey_n is no normal map"));
     let states = c::MATERIAL_ROUGH | c::MATERIAL_NORMALS | c::MATERIAL_SPECULAR_MAP;
     let state = |game: &Registration, index| game.materials.get(index).flags & states;
+    let faults = (game.materials).set_by_hand(MaterialsByHand::default(), &mut game.textures);
+    assert_eq!(faults.len(), 2, "{faults:?}");
+    assert!(faults[0].contains("t/grey_n is no normal map"));
+    // an image without heights: one line, and the surface is flat
+    assert!(faults[1].contains("t/high_nh has no heights"));
+    assert_eq!(state(&game, high), c::MATERIAL_NORMALS);
+    assert!(!game.materials.has_heights());
     assert_eq!(state(&game, wall), states);
     assert_eq!(state(&game, plain), states);
     assert_eq!(state(&game, grey), 0);

@@ -20,6 +20,7 @@ mod fog;
 mod gradients;
 mod grids;
 mod harness;
+mod heights;
 mod inspection;
 mod layers;
 mod lighting;

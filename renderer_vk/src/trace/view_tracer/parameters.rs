@@ -257,6 +257,7 @@ impl ViewTracer {
             is_subsampled(settings, targets.specular.is_some()),
         );
         set(t::VIEW_HISTORY, self.history.is_some());
+        set(t::VIEW_RELIEF, settings.parallax_mapping > 1);
         flags
     }
 

@@ -503,6 +503,10 @@ impl MaterialTable for Table {
         self.metal
     }
 
+    fn has_heights(&self) -> bool {
+        (self.infos.iter()).any(|info| info.flags & c::MATERIAL_HEIGHTS != 0)
+    }
+
     fn mean_coverage(&self, material: u32) -> Option<f32> {
         self.coverages.get(&material).copied()
     }
