@@ -76,7 +76,6 @@ pub use residuals::{Residual, residuals};
 
 use crate::cache::CalibrationCache;
 use crate::exposure::Exposure;
-use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use candidate_grid::MeasuredSpace;
 use columns::{Lamp, Source};
@@ -242,7 +241,8 @@ fn find(
 ) -> Option<Solution> {
     progress(0.0);
     let thorough = !matches!(mode, FitMode::Trial(_));
-    let occluders = Occluders::of_world(world);
+    let occluders = traced.occluders(world);
+    let occluders = &*occluders;
     // With a light cutoff a black texel is weak evidence. Trials with and without a cutoff must use the same
     // samples.
     let sampling = SamplingOptions {
@@ -251,17 +251,17 @@ fn find(
         few_black: !thorough || world.light_cutoff > 0.0,
         dirt: compiler.dirt,
     };
-    let (mut samples, evidence) = traced.take(world, &occluders, &sampling);
+    let (mut samples, evidence) = traced.take(world, occluders, &sampling);
     let texels = samples.len();
     let measured = MeasuredSpace::new(&samples);
     let mut crossings = Vec::new();
     if thorough && evidence == Evidence::Lightmaps {
-        let points = light_grid::points(world, &occluders, |at| measured.holds(at));
-        crossings = triangulation::find(world, &points, &occluders, options.candidates / CROSSINGS);
+        let points = light_grid::points(world, occluders, |at| measured.holds(at));
+        crossings = triangulation::find(world, &points, occluders, options.candidates / CROSSINGS);
         samples.extend(light_grid::additional_samples(world, &points, options));
     }
     progress(0.05);
-    let mut columns = columns::known(world, &occluders, &samples, unknown_skies);
+    let mut columns = columns::known(world, occluders, &samples, unknown_skies);
     let known = columns.len();
     let mut solution = Solution {
         known: columns.iter().map(|c| c.strength).collect(),
@@ -284,13 +284,13 @@ fn find(
     let unlisted = |material| unknown_skies.contains(&material);
     progress(0.15);
     let candidate_key = CandidateKey::of(world, &samples, &crossings, options.candidates);
-    let transfer = traced.transfer(world, &occluders, &samples, options.bounces, unlisted);
+    let transfer = traced.transfer(world, occluders, &samples, options.bounces, unlisted);
     for column in columns.iter_mut().filter(|c| c.prior.is_none()) {
         column.strength = Vec3::ZERO;
     }
     let mut fit = Fit {
         world,
-        occluders: &occluders,
+        occluders,
         unknown_skies,
         of_triangle: world.surfaces_of_triangles(),
         sampling,
@@ -319,7 +319,7 @@ fn find(
     progress(0.25);
     fit.fit_known();
     progress(0.3);
-    let own = splash::columns(world, &occluders, &fit.samples, &fit.splashes, &fit.columns);
+    let own = splash::columns(world, occluders, &fit.samples, &fit.splashes, &fit.columns);
     let splashed = fit.try_splashes(own);
     if let FitMode::Full(acceptance) = mode {
         acceptance.splashes.set(splashed);

@@ -1,5 +1,5 @@
-//! Results of rays in memory, shared between the fits of one world: samples, transfer matrices and candidate rows. Most
-//! fits use the same ones.
+//! Results of rays in memory, shared between the fits of one world, and the hierarchy of its triangles: samples, transfer
+//! matrices and candidate rows. Most fits use the same ones.
 
 use super::Evidence;
 use super::bounce::Transfer;
@@ -14,6 +14,8 @@ use std::sync::Arc;
 /// Results of rays of earlier fits.
 #[derive(Default)]
 pub(super) struct TraceCache {
+    /// Hierarchies of the world's triangles, by whether cut-outs have holes.
+    occluders: Vec<(bool, Arc<Occluders>)>,
     samples: Vec<CachedSamples>,
     transfers: Vec<CachedTransfer>,
     candidates: Option<(CandidateKey, Arc<Candidates>)>,
@@ -68,6 +70,17 @@ fn holes(world: &RelitWorld) -> bool {
 }
 
 impl TraceCache {
+    /// [`Occluders::of_world`] with reuse. Fits change a world's light, and whether its cut-outs have holes.
+    pub fn occluders(&mut self, world: &RelitWorld) -> Arc<Occluders> {
+        let holes = holes(world);
+        if let Some((_, made)) = self.occluders.iter().find(|(of, _)| *of == holes) {
+            return Arc::clone(made);
+        }
+        let made = Arc::new(Occluders::of_world(world));
+        self.occluders.push((holes, Arc::clone(&made)));
+        made
+    }
+
     /// The candidates for this key, if they are the kept ones.
     pub fn candidates(&self, key: &CandidateKey) -> Option<Arc<Candidates>> {
         let (of, candidates) = self.candidates.as_ref()?;
