@@ -11,6 +11,7 @@ use crate::world::RelitWorld;
 use glam::Vec3;
 use q3bsp::GridPoint;
 use std::f32::consts::TAU;
+use support::parallel;
 
 /// Most points of a grid that a map lacks: what compilers allow.
 const MOST: usize = 1 << 20;
@@ -63,15 +64,14 @@ pub(super) fn bake(
     let [nx, ny, _] = layout.counts;
     let count = layout.points();
     let space = targets::FreeSpace::of(world);
-    let free: Vec<Option<Vec3>> = (0..count)
-        .map(|i| {
-            let at = layout.position(i % nx, i / nx % ny, i / nx / ny);
-            let moved = TRIES
-                .iter()
-                .map(|t| at + Vec3::from_array(*t) * layout.size);
-            std::iter::once(at).chain(moved).find(|at| space.has(*at))
-        })
-        .collect();
+    let numbers: Vec<usize> = (0..count).collect();
+    let free = parallel::map(&numbers, |_, &i| {
+        let at = layout.position(i % nx, i / nx % ny, i / nx / ny);
+        let moved = TRIES
+            .iter()
+            .map(|t| at + Vec3::from_array(*t) * layout.size);
+        std::iter::once(at).chain(moved).find(|at| space.has(*at))
+    });
     let everywhere: Vec<Point> = free
         .iter()
         .flatten()

@@ -7,6 +7,7 @@ use crate::world::{RelitWorld, WorldSurface};
 use glam::{Vec2, Vec3};
 use q3bsp::{Bsp, Lightmap, SurfaceKind};
 use std::collections::HashMap;
+use support::parallel;
 use support::slice::item;
 
 /// What was changed in a map beside its pages.
@@ -27,10 +28,12 @@ impl Baked {
                 .map(|texel| Vec3::from_array(texel.map(f32::from)) / 255.0)
                 .collect(),
         };
-        let mut pages: Vec<Page> = bsp.lightmaps.iter().map(as_it_was).collect();
-        for baked in &self.pages {
-            let Some(page) = pages.get_mut(baked.number) else {
-                continue;
+        let of_number: HashMap<usize, &BakedPage> =
+            self.pages.iter().map(|page| (page.number, page)).collect();
+        parallel::map(&bsp.lightmaps, |number, before| {
+            let mut page = as_it_was(before);
+            let Some(baked) = of_number.get(&number) else {
+                return page;
             };
             let texels = page.texels.iter_mut();
             for ((texel, light), &owner) in texels.zip(&baked.light).zip(&baked.owners) {
@@ -38,8 +41,8 @@ impl Baked {
                     *texel = encoding.stored(light.value, scale_of(world, owner));
                 }
             }
-        }
-        pages
+            page
+        })
     }
 
     /// Pages of directions to the light, for a map with these pages; see

@@ -20,6 +20,9 @@ const INSIDE: f32 = -0.5;
 /// Distances by which a point inside of something solid is moved towards the middle of its triangle, id units.
 const MOVES: [f32; 2] = [2.0, 5.0];
 
+/// Places that one task searches.
+const TASK: usize = 1024;
+
 /// A texel that surfaces cover.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Texel {
@@ -137,14 +140,17 @@ impl Targets {
             }
         }
         let found = parallel::map(&of_page, |page, triangles| {
-            let places = places(slice::item(&sides, page), pattern, triangles);
-            let free = |place: &Place| space.point(place);
-            let points: Vec<Option<Point>> = places.iter().map(free).collect();
-            (places, points)
+            places(slice::item(&sides, page), pattern, triangles)
         });
-        for (number, (places, points)) in found.into_iter().enumerate() {
+        // pages differ in size, and a map may have one alone
+        let tasks: Vec<&[Place]> = found.iter().flat_map(|p| p.chunks(TASK)).collect();
+        let free = |_, some: &&[Place]| some.iter().map(|place| space.point(place)).collect();
+        let mut points = parallel::map(&tasks, free)
+            .into_iter()
+            .flat_map(|found: Vec<Option<Point>>| found);
+        for (number, places) in found.iter().enumerate() {
             let mut texels: Vec<Texel> = Vec::new();
-            for (place, point) in places.iter().zip(points) {
+            for (place, point) in places.iter().zip(points.by_ref()) {
                 if texels.last().is_none_or(|texel| texel.at != place.texel) {
                     let start = self.points.len() as u32;
                     texels.push(Texel {
