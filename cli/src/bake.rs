@@ -1,35 +1,36 @@
 //! `relight bake`: light of a map's sources, written into the map.
 
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::Instant;
+mod computer;
+mod loading;
+mod output;
+mod permits;
+mod times;
 
-use anyhow::{Context, Result, anyhow, bail};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::thread;
+
+use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
 use q3bsp::Bsp;
-use relight::bake::layout::{self, LayoutOptions, LightmapUse, PageSides};
+use relight::RelitWorld;
+use relight::bake::store;
 use relight::bake::store::deluxe::{DirectionSpace, interleave};
 use relight::bake::store::external::{numbered, scripted};
-use relight::bake::store::pack::{RelitMap, relit_pack};
-use relight::bake::store::{self, GameFile};
 use relight::bake::{
-    BakeOptions, BakeStage, Baked, BakedPage, Gather, Page, Stored, bake, light_bytes, seams,
+    BakeOptions, Baked, BakedPage, Gather, Page, Stored, bake, light_bytes, seams,
 };
 use relight::calibrate::Dirt;
-use relight::export::Output;
-use relight::light::LightColor;
-use relight::{
-    CalibrationCache, CalibrationOptions, GameFiles, Materials, Options, RelitWorld,
-    external_lightmaps,
-};
 
-use crate::bake_device;
 use crate::game::Maps;
 use crate::numbers::positive;
-use crate::scripts::load_scripts;
-use crate::view::open;
-use crate::watched::SourceText;
+use crate::viewer::cache_folder;
+use computer::Computer;
+use loading::{Loaded, Source};
+use output::is_pack;
+use permits::Permits;
+use times::Times;
 
 /// Compute the light of maps, and write it into them
 ///
@@ -95,91 +96,92 @@ pub struct BakeArgs {
 
 /// How images beside a map are found.
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
-enum External {
+pub enum External {
     /// By scripts, which every engine loads
     Scripted,
     /// By number: maps/NAME/lm_0000.tga
     Numbered,
 }
 
-/// Runs the command.
-pub fn run(args: &BakeArgs) -> Result<()> {
-    let several = args.maps.maps.len() > 1;
-    for map in &args.maps.maps {
-        let output = match several {
-            true => {
-                let stem = Path::new(map).file_stem().unwrap_or_default();
-                args.output.join(stem).with_extension("bsp")
-            }
-            false => args.output.clone(),
-        };
-        bake_map(args, map, &output)?;
-    }
-    Ok(())
+/// Stack of a thread that bakes, bytes: drivers assume that of a main thread.
+const STACK_SIZE: usize = 16 << 20;
+
+/// Maps that are worked on at once: most of a calibration and of loading is done by one thread.
+fn at_once(maps: usize) -> usize {
+    let threads = thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    (threads / 2).clamp(2, 8).min(maps)
 }
 
-/// A map, and the game that it is of.
-struct Source {
-    files: Arc<dyn GameFiles>,
-    materials: Materials,
-    /// Game path.
-    name: String,
-    /// The file.
-    bytes: Vec<u8>,
-    bsp: Bsp,
+/// Maps that have light in memory at once, up to a gigabyte each: one is lit, others are stored or wait for the device.
+const LIT_AT_ONCE: usize = 3;
+
+/// Runs the command.
+pub fn run(args: &BakeArgs) -> Result<()> {
+    // ready while the first map is read
+    let cache = args.cache.clone().or_else(cache_folder);
+    let computer = Computer::begin(args.device.as_deref(), cache.as_deref());
+    let permits = Permits::new(LIT_AT_ONCE);
+    let several = args.maps.maps.len() > 1;
+    let output = |map: &str| match several {
+        true => {
+            let stem = Path::new(map).file_stem().unwrap_or_default();
+            args.output.join(stem).with_extension("bsp")
+        }
+        false => args.output.clone(),
+    };
+    let queue = Mutex::new(args.maps.maps.iter());
+    let failed: Mutex<Option<anyhow::Error>> = Mutex::new(None);
+    let failure = || failed.lock().unwrap_or_else(PoisonError::into_inner);
+    let has_failed = || failure().is_some();
+    let next = || match has_failed() {
+        true => None,
+        false => queue.lock().unwrap_or_else(PoisonError::into_inner).next(),
+    };
+    let work = || {
+        while let Some(map) = next() {
+            let mut times = Times::new(!several);
+            let shared = (&computer, &permits);
+            if let Err(error) = bake_map(args, map, &output(map), shared, &mut times) {
+                failure().get_or_insert(error);
+            }
+        }
+    };
+    thread::scope(|scope| {
+        for _ in 1..at_once(args.maps.maps.len()) {
+            // without the thread, the others do its work
+            let builder = thread::Builder::new().stack_size(STACK_SIZE);
+            if builder.spawn_scoped(scope, work).is_err() {
+                break;
+            }
+        }
+        work();
+    });
+    let failed = failure().take();
+    failed.map_or(Ok(()), Err)
 }
 
 /// Bakes one map.
-fn bake_map(args: &BakeArgs, map: &str, output: &Path) -> Result<()> {
-    let begin = Instant::now();
-    let (files, name) = open(map, &args.maps.game)?;
-    let bytes = files.read(&name)?;
-    let bytes = bytes.with_context(|| format!("{name}: no such file in the game folders"))?;
-    let bsp = Bsp::parse(&bytes).with_context(|| name.clone())?;
-    let source = Source {
-        materials: load_scripts(&*files).0,
-        files,
-        name,
-        bytes,
-        bsp,
-    };
-    let mut lit = source.bsp.clone();
-    let is_own = add_lights_of_source(&mut lit, map)?;
-    let mut world = load(args, &source, lit, is_own)?;
-    if world.light_count() == 0 {
-        log::warn!(
-            "{}: no light source is known: light entities are read from the .map file beside a .bsp file",
-            source.name
-        );
-    }
-    let mut changed = source.bsp.clone();
-    // numbered images beside the map are its pages
-    let mut external = args.external;
-    if external_lightmaps(&mut changed, &*source.files, &source.name).is_ok_and(|count| count > 0) {
-        external = external.or(Some(External::Numbered));
-    }
-    let laid_out = args.texels.is_some() || args.external.is_some() || !has_pages(&world);
-    if laid_out {
-        lay_out(args, &source, &mut changed)?;
-        world = with_layout(&source, &changed, world);
-    }
-    let shared = if laid_out {
-        0
-    } else {
-        layout::owners(&world).shared
-    };
-    if shared > 0 {
-        log::warn!(
-            "{}: {shared} texels are shown at several places and get the mean of their light; --texels 1 gives each place its own",
-            source.name
-        );
-    }
-    let loaded = begin.elapsed();
-    let mut gather = bake_device::gather(args.device.as_deref(), &source.files, &world)?;
+fn bake_map(
+    args: &BakeArgs,
+    map: &str,
+    output: &Path,
+    (computer, permits): (&Computer, &Permits),
+    times: &mut Times,
+) -> Result<()> {
+    let Loaded {
+        source,
+        world,
+        map,
+        laid_out,
+        external,
+    } = loading::load(args, map, times)?;
+    times.begin("waiting");
+    let _permit = permits.take();
+    let mut gather = computer.gather(&source, &world);
     let job = Job {
         source: &source,
         world: &world,
-        map: &changed,
+        map: &map,
         laid_out,
         external,
         deluxe: args.deluxe,
@@ -188,18 +190,25 @@ fn bake_map(args: &BakeArgs, map: &str, output: &Path) -> Result<()> {
     let options = options(args, &world);
     if args.preview {
         for early in early_rounds(&options) {
-            job.round(&mut *gather, &early)?;
+            job.round(&mut gather, &early, times)?;
             println!(
                 "{}: {:.1} s: {} of {} bounces",
                 output.display(),
-                begin.elapsed().as_secs_f64(),
+                times.seconds(),
                 early.bounces,
                 options.bounces
             );
         }
     }
-    let (baked, pages, stored) = job.round(&mut *gather, &options)?;
-    let outside = baked.pages_outside(&changed);
+    let (baked, pages, stored) = job.round(&mut gather, &options, times)?;
+    println!(
+        "{}: {}; the points waited {:.2} s for {}",
+        source.name,
+        times.end(),
+        gather.waited.as_secs_f64(),
+        gather.name()
+    );
+    let outside = baked.pages_outside(&map);
     report(
         &source,
         &stored,
@@ -208,14 +217,9 @@ fn bake_map(args: &BakeArgs, map: &str, output: &Path) -> Result<()> {
         (!laid_out).then_some(&pages),
     );
     println!(
-        "{}: {:.1} s, {:.1} s of these for {} by {}",
+        "{}: {:.1} s, by {}",
         output.display(),
-        begin.elapsed().as_secs_f64(),
-        loaded.as_secs_f64(),
-        match world.calibration.is_some() {
-            true => "loading and finding the lights",
-            false => "loading",
-        },
+        times.seconds(),
         gather.name(),
     );
     Ok(())
@@ -265,15 +269,22 @@ impl Job<'_> {
         &self,
         gather: &mut dyn Gather,
         options: &BakeOptions,
+        times: &mut Times,
     ) -> Result<(Baked, Vec<Page>, Stored)> {
         let Job { source, world, .. } = self;
-        let baked = bake_with_bar(&source.name, world, gather, options)?;
+        times.begin("points");
+        let baked = bake(world, gather, options, &mut |stage, part| {
+            times.bake(stage, options.bounces, part);
+        })?;
+        times.begin("pages");
         let encoding = options.encoding;
         let mut map = self.map.clone();
         let mut pages = baked.pages(world, &map, encoding);
         if self.laid_out {
+            times.begin("seams");
             seams::match_seams(world, &mut pages);
         }
+        times.begin("storing");
         let stored = baked.store_beside_pages(world, &mut map, encoding);
         if baked.pages.is_empty() && stored == Stored::default() {
             bail!(
@@ -300,160 +311,9 @@ impl Job<'_> {
                 scripted(&mut map, &self.name(), &all, files, materials)?
             }
         };
-        write(source, &map, &beside, self.output)?;
+        output::write(source, &map, &beside, self.output)?;
         Ok((baked, pages, stored))
     }
-}
-
-/// Whether surfaces of a world have lightmaps.
-fn has_pages(world: &RelitWorld) -> bool {
-    world.surfaces.iter().any(|surface| surface.light_page >= 0)
-}
-
-/// Gives a map new lightmap coordinates.
-fn lay_out(args: &BakeArgs, source: &Source, bsp: &mut Bsp) -> Result<()> {
-    let material = |name: &str| LightmapUse::of(&source.materials, name);
-    let usual = match args.external {
-        Some(_) => LayoutOptions::external(&material),
-        None => LayoutOptions {
-            sides: PageSides::Fixed(bsp.format.lightmap_size() as u32),
-            ..LayoutOptions::internal(&material)
-        },
-    };
-    let options = LayoutOptions {
-        finer: args.texels.unwrap_or(1.0),
-        ..usual
-    };
-    let laid = layout::make(bsp, &options).with_context(|| source.name.clone())?;
-    println!(
-        "{}: {} charts in {} pages of {} texels a side, {:.0} % filled",
-        source.name,
-        laid.charts,
-        laid.pages,
-        laid.side,
-        laid.efficiency() * 100.0
-    );
-    if !laid.coarser.is_empty() {
-        log::warn!(
-            "{}: {} charts are larger than a page and have coarser texels; --external has larger pages",
-            source.name,
-            laid.coarser.len()
-        );
-    }
-    if !laid.styled.is_empty() && args.external != Some(External::Scripted) {
-        log::warn!(
-            "{}: {} surfaces lose the light of their light styles; --external leaves their stages out",
-            source.name,
-            laid.styled.len()
-        );
-    }
-    Ok(())
-}
-
-/// The world of a map with a new layout, with the light of the one before.
-fn with_layout(source: &Source, bsp: &Bsp, before: RelitWorld) -> RelitWorld {
-    let options = Options {
-        calibrate: None,
-        by_hand: false,
-        light_color: LightColor::Stored,
-        ..Options::default()
-    };
-    let (files, materials) = (&*source.files, &source.materials);
-    let mut world = RelitWorld::from_bsp(files, materials, &source.name, bsp.clone(), options);
-    world.measure_materials(files);
-    // materials by hand; the lights are replaced
-    world.read_by_hand(files);
-    world.set_lighting(before.lighting());
-    world
-}
-
-/// Whether an output is a pack.
-fn is_pack(output: &Path) -> bool {
-    let extension = output.extension();
-    extension.is_some_and(|e| e.eq_ignore_ascii_case("pk3"))
-}
-
-/// Writes a map with the files beside it, or a pack of them.
-fn write(source: &Source, bsp: &Bsp, beside: &[GameFile], output: &Path) -> Result<()> {
-    let mut out = Output::new(output);
-    let bytes = bsp.write();
-    if is_pack(output) {
-        let aas = Path::new(&source.name).with_extension("aas");
-        let aas = source.files.read(&aas.to_string_lossy())?;
-        let pack = relit_pack(RelitMap {
-            map: &source.name,
-            original: &source.bytes,
-            relit: &bytes,
-            aas: aas.as_deref(),
-            files: beside,
-        });
-        let pack = pack.map_err(|problem| anyhow!("{}: {problem}", output.display()))?;
-        for note in &pack.notes {
-            log::warn!("{}: {note}", source.name);
-        }
-        out.write_main(&pack.bytes)?;
-    } else {
-        let in_maps = output
-            .parent()
-            .and_then(Path::file_name)
-            .is_some_and(|name| name.eq_ignore_ascii_case("maps"));
-        for file in beside {
-            // images lie beside the map, scripts in the folder of the game if the map is in its `maps`
-            let name = match file.path.strip_prefix("maps/") {
-                Some(name) => name.to_owned(),
-                None if in_maps => format!("../{}", file.path),
-                None => file.path.clone(),
-            };
-            out.write_beside(&name, &file.bytes)?;
-        }
-        out.write_main(&bytes)?;
-    }
-    out.finish()?;
-    Ok(())
-}
-
-/// Gives a map the light entities of the `.map` file beside its `.bsp` file: compilers leave them out of the map, and read
-/// that file for light. False without that file.
-///
-/// # Errors
-/// The file cannot be read.
-fn add_lights_of_source(bsp: &mut Bsp, map: &str) -> Result<bool> {
-    let source = Path::new(map).with_extension("map");
-    if !Path::new(map).is_file() || !source.is_file() {
-        return Ok(false);
-    }
-    let name = || source.display().to_string();
-    let text = std::fs::read(&source).with_context(name)?;
-    SourceText::parse(&text).with_context(name)?.light(bsp);
-    Ok(true)
-}
-
-/// Loads a map with light as it is stored. `is_own`: its lights are known.
-fn load(args: &BakeArgs, source: &Source, mut bsp: Bsp, is_own: bool) -> Result<RelitWorld> {
-    let files = &*source.files;
-    let external = external_lightmaps(&mut bsp, files, &source.name);
-    let stored = !bsp.lightmaps.is_empty() && !args.no_calibration && !is_own;
-    let calibrate = stored.then(|| CalibrationOptions {
-        cache: args.cache.as_ref().map(CalibrationCache::new),
-        ..CalibrationOptions::default()
-    });
-    let options = Options {
-        calibrate,
-        by_hand: false,
-        light_color: LightColor::Stored,
-        ..Options::default()
-    };
-    let mut world = RelitWorld::from_bsp(files, &source.materials, &source.name, bsp, options);
-    world.warnings.extend(external.err());
-    if world.calibration.is_none() {
-        world.measure_materials(files);
-        world.take_compiled_lights(files);
-    }
-    world.read_by_hand(files);
-    for warning in &world.warnings {
-        log::warn!("{warning}");
-    }
-    Ok(world)
 }
 
 fn options(args: &BakeArgs, world: &RelitWorld) -> BakeOptions {
@@ -473,45 +333,6 @@ fn options(args: &BakeArgs, world: &RelitWorld) -> BakeOptions {
     }
     options.encoding.compensate = args.compensate;
     options
-}
-
-/// Bakes with a bar for each stage. Prints the seconds of each.
-fn bake_with_bar(
-    map: &str,
-    world: &RelitWorld,
-    gather: &mut dyn Gather,
-    options: &BakeOptions,
-) -> Result<Baked> {
-    let style = ProgressStyle::with_template("{msg:16} {bar:40} {percent} %, {eta} left")?;
-    let bar = ProgressBar::new(1000).with_style(style);
-    let mut stages: Vec<(BakeStage, Instant)> = Vec::new();
-    let name = |stage: BakeStage| match stage {
-        BakeStage::Direct => "direct light".to_owned(),
-        BakeStage::Bounce(number) => format!("bounce {number} of {}", options.bounces),
-        BakeStage::Dirt => "dirt".to_owned(),
-        BakeStage::Grid => "light grid".to_owned(),
-    };
-    let begin = Instant::now();
-    let baked = bake(world, gather, options, &mut |stage, part| {
-        if stages.last().is_none_or(|(last, _)| *last != stage) {
-            stages.push((stage, Instant::now()));
-            bar.reset();
-            bar.set_message(name(stage));
-        }
-        bar.set_position((part * 1000.0) as u64);
-    });
-    bar.finish_and_clear();
-    let baked = baked?;
-    let end = Instant::now();
-    let starts = stages.iter().map(|(_, start)| *start);
-    let ends = starts.clone().skip(1).chain([end]);
-    let first = starts.clone().next().unwrap_or(end);
-    let mut seconds = format!("points {:.2} s", (first - begin).as_secs_f64());
-    for ((stage, start), end) in stages.iter().zip(ends) {
-        seconds += &format!(", {} {:.2} s", name(*stage), (end - *start).as_secs_f64());
-    }
-    println!("{map}: {seconds}");
-    Ok(baked)
 }
 
 /// Prints what was baked; for a map that keeps its coordinates also how far its pages are from those that it had.

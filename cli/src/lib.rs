@@ -6,7 +6,6 @@
 #![forbid(unsafe_code)]
 
 mod bake;
-mod bake_device;
 mod beside;
 mod brought;
 mod calibration;

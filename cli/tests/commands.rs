@@ -257,6 +257,17 @@ fn a_bake_writes_a_whole_map_or_leaves_the_file_that_is_there() {
     let shown = output(RELIGHT, &["info", &fine, "--game", &pack]);
     assert!(shown.status.success(), "{shown:?}");
 
+    // several maps at once
+    let (copy, both) = (path("copy.bsp"), path("both"));
+    std::fs::copy(&baked, &copy).unwrap();
+    let done = bake(&baked, &both, &[&copy, "--fast", "--no-calibration"]);
+    assert!(done.status.success(), "{done:?}");
+    let light = |name: &str| {
+        let bytes = std::fs::read(folder.path().join("both").join(name)).unwrap();
+        q3bsp::Bsp::parse(&bytes).unwrap().lightmaps
+    };
+    assert!(light("hall.bsp") == bsp.lightmaps && light("copy.bsp") == bsp.lightmaps);
+
     std::fs::write(&broken, b"IBSP").unwrap();
     let refused = bake(&broken, &baked, &rough);
     assert!(!refused.status.success());
@@ -266,5 +277,5 @@ fn a_bake_writes_a_whole_map_or_leaves_the_file_that_is_there() {
     );
     assert_eq!(std::fs::read(&baked).unwrap(), bytes);
     let left = std::fs::read_dir(folder.path()).unwrap().count();
-    assert_eq!(left, 4, "a temporary file is left");
+    assert_eq!(left, 6, "a temporary file is left");
 }

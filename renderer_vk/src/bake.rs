@@ -1,26 +1,32 @@
 //! Light at points of a map on the GPU, for map tools: [`relight::bake::Gather`] without a window and without frames.
 
-use std::sync::Arc;
+mod images;
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use glam::Vec3;
 use relight::bake::{Gather, GatherError, GatherProgress, Light, LitSurfaces, Point};
-use relight::{GameFiles, RelitWorld};
+use relight::calibrate::Surroundings;
+use relight::{GameFiles, Materials, RelitWorld};
 
 use crate::assets::Assets;
 use crate::error::Error;
 use crate::gpu::{
     self, Buffer, BufferUsage, Device, DeviceInfo, DeviceOptions, FrameRing, SurfaceSource,
 };
-use crate::renderer::FRAMES_IN_FLIGHT;
+use crate::renderer::{FRAMES_IN_FLIGHT, KeptPipelines};
 use crate::settings::{Settings, TracerChoice};
-use crate::trace::bake::{BakeScene, Baker};
+use crate::trace::bake::{BakeScene, Baker, Shared};
+use crate::trace::bake_passes::BakePasses;
 use crate::trace::geometry::StaticGeometry;
 use crate::trace::input::{StaticScene, StaticSurface};
 use crate::trace::lights::MapLightSource;
 use crate::trace::tracer::Tracer;
 use crate::world::{Occluding, WorldOptions};
+use images::BakeImages;
 
-/// Options of a [`GpuGather`].
+/// Options of a [`BakeDevice`].
 #[derive(Clone, Debug, Default)]
 pub struct GatherOptions {
     /// Part of the name of the preferred device.
@@ -29,17 +35,33 @@ pub struct GatherOptions {
     pub validation: bool,
     /// How rays are traced.
     pub tracer: TracerChoice,
+    /// File that keeps the driver's pipeline cache between runs.
+    pub pipeline_cache: Option<PathBuf>,
+}
+
+/// A GPU with the compiled passes of bakes. Any number of maps share it, each with a [`GpuGather`] in a thread of its own:
+/// their work is done in turn, a call at a time.
+pub struct BakeDevice {
+    // fields are dropped in this order: objects of the device before the device
+    work: Mutex<Work>,
+    tracer: Tracer,
+    device: Device,
+}
+
+/// What one thread at a time uses.
+struct Work {
+    passes: BakePasses,
+    ring: FrameRing,
+    kept: KeptPipelines,
 }
 
 /// Computes light at points of one world on a GPU.
 pub struct GpuGather {
-    // fields are dropped in this order: objects of the device before the device
     baker: Baker,
     geometry: StaticGeometry,
     assets: Assets,
     _vertices: Buffer,
-    ring: FrameRing,
-    device: Device,
+    on: Arc<BakeDevice>,
 }
 
 /// Whether the world's materials let light pass through a surface; for compiled lights these follow the compiler's rules.
@@ -90,39 +112,92 @@ fn sky_light(world: &RelitWorld, geometry: &StaticGeometry) -> Vec<Vec3> {
     geometry.sources.iter().map(radiance).collect()
 }
 
-impl GpuGather {
-    /// Finds a device, and uploads a world with the images of its materials.
+impl BakeDevice {
+    /// Finds a device.
     ///
     /// # Errors
     /// There is no Vulkan or no suitable device, or the device is out of memory.
-    pub fn new(
-        options: &GatherOptions,
-        files: Arc<dyn GameFiles>,
-        world: &RelitWorld,
-    ) -> Result<Self, Error> {
+    pub fn new(options: &GatherOptions) -> Result<Self, Error> {
+        let (kept, pipeline_cache) = KeptPipelines::read(options.pipeline_cache.clone());
         let device_options = DeviceOptions {
             app_name: "Relight".into(),
             validation: options.validation,
             prefer: options.device.clone(),
+            pipeline_cache,
             ..DeviceOptions::default()
         };
         let device = Device::new(&device_options, SurfaceSource::Headless)?;
-        Ok(Self::on(&device, options.tracer, files, world)?)
+        let tracer = Tracer::of(device.info(), options.tracer);
+        let work = Work {
+            passes: BakePasses::new(&device, tracer),
+            ring: FrameRing::new(&device, FRAMES_IN_FLIGHT)?,
+            kept,
+        };
+        Ok(Self {
+            work: Mutex::new(work),
+            tracer,
+            device,
+        })
     }
 
-    fn on(
-        device: &Device,
-        tracer: TracerChoice,
+    /// Compiles the passes, which their first use does otherwise, and keeps the driver's pipeline cache.
+    ///
+    /// # Errors
+    /// The driver refuses a pipeline, or the device is out of memory.
+    pub fn compile(&self) -> Result<(), Error> {
+        let mut work = self.turn();
+        work.passes.all()?;
+        work.kept.write(&self.device);
+        Ok(())
+    }
+
+    /// The device in use.
+    pub fn info(&self) -> &DeviceInfo {
+        self.device.info()
+    }
+
+    /// Messages of the validation layer so far.
+    pub fn validation_messages(&self) -> Vec<String> {
+        self.device.validation_messages()
+    }
+
+    /// Waits for its turn.
+    fn turn(&self) -> MutexGuard<'_, Work> {
+        // a call that panicked has left no frame open
+        self.work.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl GpuGather {
+    /// Uploads a world with the images of its cut-outs. `scripts`: those of `files`.
+    ///
+    /// # Errors
+    /// The device is out of memory.
+    pub fn new(
+        on: &Arc<BakeDevice>,
         files: Arc<dyn GameFiles>,
+        scripts: Arc<Materials>,
+        world: &RelitWorld,
+    ) -> Result<Self, Error> {
+        // uploads are submitted with the work of their turn
+        let _turn = on.turn();
+        Ok(Self::upload(on, files, scripts, world)?)
+    }
+
+    fn upload(
+        on: &Arc<BakeDevice>,
+        files: Arc<dyn GameFiles>,
+        scripts: Arc<Materials>,
         world: &RelitWorld,
     ) -> Result<Self, gpu::Error> {
+        let BakeDevice { tracer, device, .. } = &**on;
         let settings = Settings::default();
-        let scripts = Arc::new(relight::Materials::load(&*files).0);
         let mut assets = Assets::new(device, files, scripts, &settings)?;
         let options = WorldOptions::new(&settings);
-        let (materials, textures) = (&mut assets.materials, &mut assets.textures);
-        let occluding = Occluding::new(world, materials, textures, &options);
-        for warning in materials.set_by_hand(world.by_hand.clone(), textures) {
+        let materials = &mut assets.materials;
+        let mut images = BakeImages::new(&mut assets.textures, world);
+        let occluding = Occluding::new(world, materials, &mut images, &options);
+        for warning in materials.set_by_hand(world.by_hand.clone(), &mut images) {
             log::warn!("{}: {warning}", world.name);
         }
         assets.prepare_frame(&settings)?;
@@ -133,8 +208,7 @@ impl GpuGather {
             &occluding.vertices,
         )?;
         let scene = static_scene(world, &occluding, vertices.address());
-        let tracer = Tracer::of(device.info(), tracer);
-        let structures = (tracer, settings.rt_grid_cells);
+        let structures = (*tracer, settings.rt_grid_cells);
         let geometry = StaticGeometry::new(device, structures, &scene, &assets)?;
         let lights = MapLightSource {
             triangles: &world.lights,
@@ -147,33 +221,33 @@ impl GpuGather {
         };
         let sky_light = sky_light(world, &geometry);
         Ok(Self {
-            baker: Baker::new(device, tracer, &lights, &sky_light)?,
+            baker: Baker::new(device, *tracer, &lights, &sky_light)?,
             geometry,
             assets,
             _vertices: vertices,
-            ring: FrameRing::new(device, FRAMES_IN_FLIGHT)?,
-            device: device.clone(),
+            on: Arc::clone(on),
         })
     }
 
-    /// The device in use.
-    pub fn device_info(&self) -> &DeviceInfo {
-        self.device.info()
+    /// Computes with the passes in this map's turn.
+    fn compute<T>(
+        &mut self,
+        call: impl FnOnce(&mut Baker, &mut Shared<'_>, BakeScene<'_>) -> Result<T, gpu::Error>,
+    ) -> Result<T, GatherError> {
+        let mut turn = self.on.turn();
+        let Work { passes, ring, .. } = &mut *turn;
+        let scene = BakeScene {
+            geometry: &self.geometry,
+            materials: &self.assets,
+        };
+        call(&mut self.baker, &mut Shared { ring, passes }, scene)
+            .map_err(|error| GatherError(error.to_string()))
     }
-
-    /// Messages of the validation layer so far.
-    pub fn validation_messages(&self) -> Vec<String> {
-        self.device.validation_messages()
-    }
-}
-
-fn failure(error: gpu::Error) -> GatherError {
-    GatherError(error.to_string())
 }
 
 impl Gather for GpuGather {
     fn name(&self) -> String {
-        self.device.info().name.clone()
+        self.on.info().name.clone()
     }
 
     fn direct(
@@ -182,13 +256,7 @@ impl Gather for GpuGather {
         samples: u32,
         progress: GatherProgress<'_>,
     ) -> Result<Vec<Light>, GatherError> {
-        let scene = BakeScene {
-            geometry: &self.geometry,
-            materials: &self.assets,
-        };
-        (self.baker)
-            .direct(&mut self.ring, scene, points, samples, progress)
-            .map_err(failure)
+        self.compute(|baker, shared, scene| baker.direct(shared, scene, points, samples, progress))
     }
 
     fn reflected(
@@ -198,12 +266,17 @@ impl Gather for GpuGather {
         rays: u32,
         progress: GatherProgress<'_>,
     ) -> Result<Vec<Light>, GatherError> {
-        let scene = BakeScene {
-            geometry: &self.geometry,
-            materials: &self.assets,
-        };
-        (self.baker)
-            .reflected(&mut self.ring, scene, points, &lit, rays, progress)
-            .map_err(failure)
+        self.compute(|baker, shared, scene| {
+            baker.reflected(shared, scene, points, (&lit, rays), progress)
+        })
+    }
+
+    fn nearness(
+        &mut self,
+        points: &[Point],
+        around: &Surroundings,
+        progress: GatherProgress<'_>,
+    ) -> Result<Vec<f32>, GatherError> {
+        self.compute(|baker, shared, scene| baker.nearness(shared, scene, points, around, progress))
     }
 }

@@ -32,7 +32,7 @@ mod trace;
 mod world;
 
 pub use assets::LoadedFont;
-pub use bake::{GatherOptions, GpuGather};
+pub use bake::{BakeDevice, GatherOptions, GpuGather};
 pub use error::Error;
 pub use gpu::{
     CreateSurface, DeviceInfo, DeviceKind, Error as GpuError, RayTracingLimits, Window,

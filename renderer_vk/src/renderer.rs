@@ -36,7 +36,7 @@ use crate::trace::tracer::Tracer;
 use crate::world::{EntityTokens, Marker, World, WorldOptions};
 
 use held::HeldViews;
-use kept_pipelines::KeptPipelines;
+pub(crate) use kept_pipelines::KeptPipelines;
 use output::milliseconds;
 pub use output::{CpuTimes, FrameStats};
 use still::StillRequest;

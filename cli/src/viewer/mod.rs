@@ -79,7 +79,7 @@ pub struct WindowArgs {
 }
 
 /// The user's cache folder of this program; `None` if the environment names none.
-fn cache_folder() -> Option<PathBuf> {
+pub fn cache_folder() -> Option<PathBuf> {
     let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
     let folder = if cfg!(windows) {
         PathBuf::from(set("LOCALAPPDATA")?)

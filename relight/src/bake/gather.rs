@@ -1,5 +1,6 @@
 //! What computes light at points: the CPU ([`Rays`](super::Rays)), or a GPU by the renderer.
 
+use crate::calibrate::Surroundings;
 use glam::{Vec2, Vec3};
 
 /// A place whose light is wanted.
@@ -107,4 +108,16 @@ pub trait Gather {
         rays: u32,
         progress: GatherProgress<'_>,
     ) -> Result<Vec<Light>, GatherError>;
+
+    /// How near surfaces are around points with normals: the mean over the rays of 1 − distance over reach. A ray that
+    /// meets nothing within the reach, or sky, counts 0.
+    ///
+    /// # Errors
+    /// [`GatherError`]: the device is lost or out of memory.
+    fn nearness(
+        &mut self,
+        points: &[Point],
+        around: &Surroundings,
+        progress: GatherProgress<'_>,
+    ) -> Result<Vec<f32>, GatherError>;
 }

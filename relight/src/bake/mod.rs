@@ -38,7 +38,6 @@ pub use page::{Page, light_bytes};
 pub use rays::Rays;
 
 use crate::calibrate::Dirt;
-use crate::occluders::Occluders;
 use crate::world::{RelitWorld, WorldMaterial};
 use glam::Vec3;
 use q3bsp::GridPoint;
@@ -163,21 +162,21 @@ pub fn bake(
     progress: BakeProgress<'_>,
 ) -> Result<Baked, GatherError> {
     let targets = Targets::of(world, options.pattern);
+    let firsts = Places::first_points(&targets);
     let direct = gather.direct(&targets.points, options.samples, &mut |part| {
         progress(BakeStage::Direct, part);
     })?;
     let mut places = Places::of(&targets, |points| mean(part(&direct, points)));
-    bounce(world, &targets, &mut places, gather, options, progress)?;
+    let of_places = (&targets, firsts.as_slice());
+    bounce(world, of_places, &mut places, gather, options, progress)?;
     places
         .lights_mut()
         .for_each(|light| light.value += world.ambient);
     if let Some(dirt) = options.dirt {
-        progress(BakeStage::Dirt, 0.0);
-        let occluders = Occluders::of_world(world);
-        places.darken(&targets, |point| {
-            dirt.part_stored(&occluders, point.position, point.normal)
-        });
-        progress(BakeStage::Dirt, 1.0);
+        let near = gather.nearness(&firsts, &dirt.surroundings(), &mut |part| {
+            progress(BakeStage::Dirt, part);
+        })?;
+        places.darken(&targets, near.iter().map(|near| dirt.part_stored(*near)));
     }
     let grid = match options.grid {
         true => grid::bake(
@@ -202,10 +201,10 @@ fn mean(points: &[Light]) -> Light {
     sum * (1.0 / points.len().max(1) as f32)
 }
 
-/// Adds the bounces to the light of all places.
+/// Adds the bounces to the light of all places. `firsts`: [`Places::first_points`].
 fn bounce(
     world: &RelitWorld,
-    targets: &Targets,
+    (targets, firsts): (&Targets, &[Point]),
     places: &mut Places,
     gather: &mut dyn Gather,
     options: &BakeOptions,
@@ -215,11 +214,6 @@ fn bounce(
         return Ok(());
     }
     let reflectances = reflectances(world, options.reflectance);
-    let firsts = Places::first_points(targets);
-    let points: Vec<Point> = firsts
-        .iter()
-        .map(|&i| item_or(&targets.points, i))
-        .collect();
     let mut last = places.clone();
     if world.has_compiled_lights {
         // q3map2 reflects the ambient term once
@@ -234,7 +228,7 @@ fn bounce(
             reflectances: &reflectances,
             light: &light,
         };
-        let reflected = gather.reflected(&points, lit, options.rays, &mut |part| {
+        let reflected = gather.reflected(firsts, lit, options.rays, &mut |part| {
             progress(BakeStage::Bounce(number), part);
         })?;
         let mut found = reflected.iter().copied();
@@ -248,15 +242,6 @@ fn bounce(
         }
     }
     Ok(())
-}
-
-/// An item, or a point that nothing reaches.
-fn item_or(points: &[Point], index: u32) -> Point {
-    let none = Point {
-        position: Vec3::ZERO,
-        normal: Vec3::Z,
-    };
-    points.get(index as usize).copied().unwrap_or(none)
 }
 
 /// What each triangle reflects.
@@ -277,6 +262,32 @@ fn reflectances(world: &RelitWorld, kind: Reflectance) -> Vec<Vec3> {
         support::slice::part_mut(&mut all, surface.triangles()).fill(value);
     }
     all
+}
+
+/// Owners and light of each page, and its side.
+fn of_pages<'a>(
+    targets: &Targets,
+    mut owners: &'a mut [u32],
+    mut light: &'a mut [Light],
+) -> Vec<(usize, &'a mut [u32], &'a mut [Light])> {
+    let mut first = 0;
+    let cut = |page: &targets::Page| {
+        let (before, texels) = (page.first - first, page.side * page.side);
+        first = page.first + texels;
+        let owners = cut_off(&mut owners, before, texels);
+        let light = cut_off(&mut light, before, texels);
+        (page.side, owners, light)
+    };
+    targets.pages.iter().map(cut).collect()
+}
+
+/// Removes the first `before` items of a list, and the next `count`, which it returns.
+fn cut_off<'a, T>(rest: &mut &'a mut [T], before: usize, count: usize) -> &'a mut [T] {
+    let all = std::mem::take(rest);
+    let (_, all) = all.split_at_mut(before.min(all.len()));
+    let (cut, after) = all.split_at_mut(count.min(all.len()));
+    *rest = after;
+    cut
 }
 
 /// Light of all places: texels of all pages, then the world's vertices; and of the vertices that store light.
@@ -333,46 +344,35 @@ impl Places {
     }
 
     /// The first point of each place that has some, in the order of [`Places::of`].
-    fn first_points(targets: &Targets) -> Vec<u32> {
+    fn first_points(targets: &Targets) -> Vec<Point> {
         let texels = targets.pages.iter().flat_map(|page| &page.texels);
         let vertices = targets.vertices.iter().map(|vertex| &vertex.points);
         texels
             .map(|texel| &texel.points)
             .chain(vertices)
             .filter(|points| !points.is_empty())
-            .map(|points| points.start)
+            .filter_map(|points| targets.points.get(points.start as usize).copied())
             .collect()
     }
 
     /// Gives texels around the covered ones light.
     fn fill(&mut self, targets: &Targets) {
-        for page in &targets.pages {
-            let range = page.first..page.first + page.side * page.side;
-            if let (Some(owners), Some(light)) =
-                (self.owners.get_mut(range.clone()), self.all.get_mut(range))
-            {
-                coverage::fill(page.side, RINGS, owners, light, mean);
-            }
-        }
+        let mut pages = of_pages(targets, &mut self.owners, &mut self.all);
+        parallel::each(&mut pages, |(side, owners, light)| {
+            coverage::fill(*side, RINGS, owners, light, mean);
+        });
     }
 
     /// Smooths the light of texels over their neighbours on the same plane.
     fn smooth(&mut self, world: &RelitWorld, targets: &Targets) {
-        for page in &targets.pages {
-            let range = page.first..page.first + page.side * page.side;
-            if let (Some(owners), Some(light)) =
-                (self.owners.get(range.clone()), self.all.get_mut(range))
-            {
-                smooth::smooth(world, page.side, owners, light);
-            }
-        }
+        let mut pages = of_pages(targets, &mut self.owners, &mut self.all);
+        parallel::each(&mut pages, |(side, owners, light)| {
+            smooth::smooth(world, *side, owners, light);
+        });
     }
 
-    /// Multiplies the light of each place by a factor of its first point.
-    fn darken(&mut self, targets: &Targets, factor: impl Fn(&Point) -> f32 + Sync) {
-        let firsts = Places::first_points(targets);
-        let factors = parallel::map(&firsts, |_, &i| factor(&item_or(&targets.points, i)));
-        let mut factors = factors.into_iter();
+    /// Multiplies the light of each place by the factor of its first point, in the order of [`Places::first_points`].
+    fn darken(&mut self, targets: &Targets, mut factors: impl Iterator<Item = f32>) {
         let mut of_places = Places::of(targets, |points| match points.is_empty() {
             true => Light::default(),
             false => Light {

@@ -1,6 +1,7 @@
 //! Light at points by shadow rays on the CPU.
 
 use super::{Gather, GatherError, GatherProgress, Light, LitSurfaces, LitTriangle, Point};
+use crate::calibrate::Surroundings;
 use crate::calibrate::triangle_lights::{lambert, solid_angle};
 use crate::emitters::{LightRef, PointLight, SunLight, TriangleLight};
 use crate::occluders::Occluders;
@@ -426,12 +427,12 @@ fn light_at(world: &RelitWorld, lit: LitSurfaces<'_>, triangle: usize, at: Vec3)
 
 impl Rays<'_> {
     /// Computes points in tasks; `one` gets a task's first number and its points.
-    fn tasks(
+    fn tasks<T: Send>(
         &self,
         points: &[Point],
         progress: GatherProgress<'_>,
-        one: impl Fn(usize, &[Point]) -> Vec<Light> + Sync,
-    ) -> Vec<Light> {
+        one: impl Fn(usize, &[Point]) -> Vec<T> + Sync,
+    ) -> Vec<T> {
         let tasks: Vec<&[Point]> = points.chunks(TASK).collect();
         // progress is reported between rounds
         let round = tasks.len().div_ceil(64).max(64);
@@ -480,5 +481,15 @@ impl Gather for Rays<'_> {
                 .map(|(number, point)| self.reflected_at(point, lit, rays, number))
                 .collect()
         }))
+    }
+
+    fn nearness(
+        &mut self,
+        points: &[Point],
+        around: &Surroundings,
+        progress: GatherProgress<'_>,
+    ) -> Result<Vec<f32>, GatherError> {
+        let at = |point: &Point| around.nearness(&self.occluders, point.position, point.normal);
+        Ok(self.tasks(points, progress, |_, task| task.iter().map(at).collect()))
     }
 }

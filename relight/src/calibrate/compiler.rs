@@ -12,7 +12,8 @@
 //! light clearly; a gamma also needs a second gamma to lower it, and must not contradict the directives. Trials
 //! have equal freedom, so they are compared at all texels: a fifth of the texels is too noisy.
 
-use super::compiler_command_line::{self, CommandLine, Dirt};
+use super::compiler_command_line::{self, CommandLine};
+use super::dirt::Dirt;
 use super::fit::ROUNDS;
 use super::trace_cache::TraceCache;
 use super::{CalibrationCache, CalibrationOptions, CalibrationReport, Evidence, FitMode, Solution};

@@ -41,6 +41,7 @@ mod columns;
 mod compiler;
 mod compiler_command_line;
 mod cutoff;
+mod dirt;
 mod fit;
 mod hypotheses;
 mod light_grid;
@@ -68,8 +69,8 @@ mod triangulation;
 mod vertices;
 
 pub use crate::emitters::{Agreement, CalibrationReport, Evidence};
-pub use compiler_command_line::Dirt;
 pub(crate) use compiler_command_line::dirt_of_calibrated;
+pub use dirt::{Dirt, Surroundings};
 pub use near_light::{Spots, spots};
 pub use recovery::{FOUND_WITHIN, POWER_WITHIN, Recovery, hide_entities, recovery};
 pub use residuals::{Residual, residuals};

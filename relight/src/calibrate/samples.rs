@@ -4,7 +4,7 @@
 //! compiler's gamma g (see [`light`](mod@crate::light)). Its colour is what the engine shows:
 //! [`LightColor`](crate::light::LightColor).
 
-use super::compiler_command_line::Dirt;
+use super::dirt::{Dirt, Surroundings};
 use super::light_grid;
 use super::texels::{self, Stored, lit_by_texel};
 use super::vertices;
@@ -154,8 +154,8 @@ fn area(world: &RelitWorld, is: fn(&WorldSurface) -> bool) -> f64 {
 pub(super) struct SampleContext<'a> {
     pub world: &'a RelitWorld,
     pub occluders: &'a Occluders,
-    /// The compiler's ambient occlusion.
-    dirt: Option<Dirt>,
+    /// The compiler's ambient occlusion, and its rays.
+    dirt: Option<(Dirt, Surroundings)>,
     /// Seed of the held-out choice.
     pub seed: u64,
 }
@@ -170,17 +170,18 @@ impl<'a> SampleContext<'a> {
         SampleContext {
             world,
             occluders,
-            dirt: sampling.dirt,
+            dirt: sampling.dirt.map(|dirt| (dirt, dirt.surroundings())),
             seed: sampling.seed,
         }
     }
 
     /// Divides a [sample](sample_at) by the part of its light that the compiler's dirt left, if it computed dirt.
     pub fn remove_dirt(&self, sample: &mut Sample) {
-        let Some(dirt) = self.dirt else {
+        let Some((dirt, around)) = &self.dirt else {
             return;
         };
-        sample.part = dirt.part_stored(self.occluders, sample.position, sample.normal);
+        sample.part =
+            dirt.part_stored(around.nearness(self.occluders, sample.position, sample.normal));
         sample.value /= sample.part;
         sample.floor /= sample.part;
     }

@@ -34,9 +34,7 @@ pub use models::{IqmModel, Md3Lod, MdrModel, Model, Models};
 pub use prepare::TextureSettings;
 pub(crate) use prepare::{desaturate, grey};
 pub use skins::Skins;
-#[cfg(test)]
-pub use source::ImageFlags;
-pub use source::ImageSource;
+pub use source::{ImageFlags, ImageSource};
 pub use textures::{Samplers, Textures};
 
 use crate::gpu::{self, Device};

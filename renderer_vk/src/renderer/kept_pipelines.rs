@@ -8,7 +8,7 @@ use crate::gpu::{self, Device};
 /// The file of a device's pipeline cache. If it cannot be read or written, the log has one warning, and pipelines are
 /// compiled.
 #[derive(Debug, Default)]
-pub(super) struct KeptPipelines {
+pub(crate) struct KeptPipelines {
     /// `None`: the cache is not stored.
     path: Option<PathBuf>,
     /// Length and hash of the file's content.

@@ -10,26 +10,23 @@ use std::time::{Duration, Instant};
 
 use glam::Vec3;
 use relight::bake::{Light, LitSurfaces, Point};
-use shaders::RayShader;
+use relight::calibrate::Surroundings;
 use shaders::trace_types as t;
 use shaders::trace_types::constants::NO_IMAGE;
 use shaders::types::{Instance, constants::INSTANCE_UNLIT};
 
 use super::accel::Accel;
-use super::bake_lights::{BakeLights, BakeSurfaces};
+use super::bake_lights::{BakeLights, BakeSurfaces, BakeSurroundings};
+use super::bake_passes::{BakePass, BakePasses, Chunk, MOST_POINTS};
 use super::geometry::StaticGeometry;
 use super::input::MaterialTable;
 use super::lights::{MapLightSource, count};
 use super::pass_set::Pipeline;
 use super::tracer::Tracer;
 use crate::api::RefDef;
-use crate::gpu::{
-    Access, Buffer, BufferDesc, BufferUsage, ComputePipeline, Device, Error, FrameRing, Memory,
-};
+use crate::gpu::{Access, ComputePipeline, Device, Error, FrameRing};
 use crate::scene::{TracedPart, TracedScene, View};
 
-/// Most points of a chunk: 24 bytes of each up and 24 down, for two chunks at a time, which have 80 bytes a point.
-const MOST_POINTS: usize = 1 << 18;
 /// Least and first number of points of a chunk.
 const LEAST_POINTS: usize = 1 << 8;
 const FIRST_POINTS: usize = 1 << 14;
@@ -49,65 +46,6 @@ pub struct BakeScene<'a> {
     pub materials: &'a dyn MaterialTable,
 }
 
-/// Buffers of a chunk of points.
-struct Chunk {
-    points: Buffer,
-    results: Buffer,
-    estimates: Buffer,
-    read: Buffer,
-}
-
-impl Chunk {
-    fn new(device: &Device) -> Result<Self, Error> {
-        let make = |name, bytes: usize, memory| {
-            let desc = BufferDesc {
-                name,
-                size: (MOST_POINTS * bytes) as u64,
-                usage: BufferUsage::STORAGE,
-                memory,
-            };
-            Buffer::new(device, &desc)
-        };
-        let light = size_of::<t::BakeLight>();
-        Ok(Self {
-            points: make("bake points", size_of::<t::BakePoint>(), Memory::Upload)?,
-            results: make("bake results", light, Memory::Device)?,
-            estimates: make(
-                "bake estimates",
-                size_of::<t::BakeEstimate>(),
-                Memory::Device,
-            )?,
-            read: make("bake read-back", light, Memory::Readback)?,
-        })
-    }
-
-    fn upload(&self, points: &[Point]) -> Result<(), Error> {
-        // rays must be finite
-        let is_finite = |point: &&Point| point.position.is_finite() && point.normal.is_finite();
-        let points: Vec<t::BakePoint> = (points.iter())
-            .map(|point| match Some(point).filter(is_finite) {
-                Some(point) => t::BakePoint {
-                    position: point.position,
-                    normal: point.normal,
-                },
-                None => t::BakePoint::default(),
-            })
-            .collect();
-        self.points.write(0, bytemuck::cast_slice(&points))
-    }
-
-    /// Appends the results of the first `count` points.
-    fn take(&self, count: usize, into: &mut Vec<Light>) -> Result<(), Error> {
-        let mut results = vec![t::BakeLight::default(); count];
-        self.read.read(0, bytemuck::cast_slice_mut(&mut results))?;
-        into.extend(results.iter().map(|light| Light {
-            value: light.value,
-            towards: light.towards,
-        }));
-        Ok(())
-    }
-}
-
 /// Bounds of chunks and slices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
@@ -118,6 +56,7 @@ pub struct Limits {
 }
 
 /// Sizes of chunks and slices, by the measured duration of submissions.
+#[derive(Clone, Copy)]
 struct Pace {
     limits: Limits,
     /// Points of the next chunk.
@@ -166,12 +105,6 @@ struct Submitted {
     is_first: bool,
 }
 
-/// One of the passes, compiled.
-struct BakePass {
-    name: &'static str,
-    pipeline: Pipeline,
-}
-
 /// What is computed at points.
 struct Work<'a> {
     pass: &'a BakePass,
@@ -189,30 +122,19 @@ pub struct Baker {
     /// The map alone.
     scene: TracedScene,
     lights: BakeLights,
-    direct: Option<BakePass>,
-    estimate: Option<ComputePipeline>,
-    reflected: Option<BakePass>,
-    chunks: Option<[Chunk; 2]>,
+    /// What earlier calls have found out about the sizes of chunks and slices.
+    paces: [Option<Pace>; 3],
     /// Bounds of chunks and slices, on which results do not depend.
     pub limits: Limits,
-    tracer: Tracer,
     device: Device,
 }
 
-fn pass<'a>(
-    (device, tracer): (&Device, Tracer),
-    kept: &'a mut Option<BakePass>,
-    name: &'static str,
-    shader: &RayShader,
-) -> Result<&'a BakePass, Error> {
-    let made = match kept.take() {
-        Some(made) => made,
-        None => BakePass {
-            name,
-            pipeline: Pipeline::of_rays(device, tracer, name, shader, &[])?,
-        },
-    };
-    Ok(kept.insert(made))
+/// What all maps of a device share.
+pub struct Shared<'a> {
+    /// Its submissions.
+    pub ring: &'a mut FrameRing,
+    /// Its passes.
+    pub passes: &'a mut BakePasses,
 }
 
 impl Baker {
@@ -249,15 +171,11 @@ impl Baker {
                 look: TracedPart::default(),
             },
             lights: BakeLights::new(device, lights, sky_light)?,
-            direct: None,
-            estimate: None,
-            reflected: None,
-            chunks: None,
+            paces: [None; 3],
             limits: Limits {
                 points: MOST_POINTS,
                 slice: u32::MAX,
             },
-            tracer,
             device: device.clone(),
         })
     }
@@ -268,32 +186,25 @@ impl Baker {
     /// Out of memory, or a lost device.
     pub fn direct(
         &mut self,
-        ring: &mut FrameRing,
+        shared: &mut Shared<'_>,
         scene: BakeScene<'_>,
         points: &[Point],
         samples: u32,
         progress: &mut dyn FnMut(f32),
     ) -> Result<Vec<Light>, Error> {
-        let on = (&self.device, self.tracer);
-        let shader = &shaders::TRACE_BAKE_DIRECT;
         let (view, all) = self.lights.view(scene.geometry, samples);
-        let estimate = match self.estimate.take() {
-            Some(made) => made,
-            None => {
-                let spirv = &shaders::TRACE_BAKE_ESTIMATE_COMP;
-                ComputePipeline::new(&self.device, "bake_estimate", spirv, &[])?
-            }
-        };
+        let (passes, chunks) = shared.passes.all()?;
         let work = Work {
-            pass: pass(on, &mut self.direct, "bake_direct", shader)?,
-            before: Some(self.estimate.insert(estimate)),
+            pass: &passes.direct,
+            before: Some(&passes.estimate),
             view,
             samples,
             all,
         };
         let structures = (&mut self.accel, &self.scene);
-        let run = Run::new(&self.device, structures, ring, scene, self.limits);
-        run.all(&work, &mut self.chunks, points, progress)
+        let pace = self.paces[0].get_or_insert(Pace::new(self.limits));
+        let run = Run::new(structures, shared.ring, scene, pace);
+        run.all(&work, chunks, points, progress)
     }
 
     /// Light that surfaces reflect, by `rays` from each point; see [`relight::bake::Gather::reflected`].
@@ -302,32 +213,59 @@ impl Baker {
     /// Out of memory, or a lost device.
     pub fn reflected(
         &mut self,
-        ring: &mut FrameRing,
+        shared: &mut Shared<'_>,
         scene: BakeScene<'_>,
         points: &[Point],
-        lit: &LitSurfaces<'_>,
-        rays: u32,
+        (lit, rays): (&LitSurfaces<'_>, u32),
         progress: &mut dyn FnMut(f32),
     ) -> Result<Vec<Light>, Error> {
         let surfaces = BakeSurfaces::new(&self.device, scene.geometry, lit)?;
-        let on = (&self.device, self.tracer);
-        let shader = &shaders::TRACE_BAKE_REFLECTED;
+        let (passes, chunks) = shared.passes.all()?;
         let work = Work {
-            pass: pass(on, &mut self.reflected, "bake_reflected", shader)?,
+            pass: &passes.reflected,
             before: None,
             view: surfaces.view(scene.geometry),
             samples: rays.max(1),
             all: rays.max(1),
         };
         let structures = (&mut self.accel, &self.scene);
-        let run = Run::new(&self.device, structures, ring, scene, self.limits);
-        run.all(&work, &mut self.chunks, points, progress)
+        let pace = self.paces[1].get_or_insert(Pace::new(self.limits));
+        let run = Run::new(structures, shared.ring, scene, pace);
+        run.all(&work, chunks, points, progress)
+    }
+
+    /// How near surfaces are; see [`relight::bake::Gather::nearness`].
+    ///
+    /// # Errors
+    /// Out of memory, or a lost device.
+    pub fn nearness(
+        &mut self,
+        shared: &mut Shared<'_>,
+        scene: BakeScene<'_>,
+        points: &[Point],
+        around: &Surroundings,
+        progress: &mut dyn FnMut(f32),
+    ) -> Result<Vec<f32>, Error> {
+        let surroundings = BakeSurroundings::new(&self.device, around)?;
+        let (passes, chunks) = shared.passes.all()?;
+        let rays = count(around.rays.len());
+        let work = Work {
+            pass: &passes.nearness,
+            before: None,
+            view: surroundings.view(scene.geometry),
+            samples: rays,
+            all: rays,
+        };
+        let structures = (&mut self.accel, &self.scene);
+        let pace = self.paces[2].get_or_insert(Pace::new(self.limits));
+        let run = Run::new(structures, shared.ring, scene, pace);
+        let found = run.all(&work, chunks, points, progress)?;
+        Ok(found.iter().map(|near| near.value.x).collect())
     }
 }
 
 /// A call in progress.
 struct Run<'a> {
-    device: &'a Device,
     accel: &'a mut Accel,
     view: &'a TracedScene,
     ring: &'a mut FrameRing,
@@ -335,40 +273,34 @@ struct Run<'a> {
     in_flight: VecDeque<Submitted>,
     /// The newest time at which a submission was known to have ended.
     idle_since: Instant,
-    pace: Pace,
+    pace: &'a mut Pace,
 }
 
 impl<'a> Run<'a> {
     fn new(
-        device: &'a Device,
         (accel, view): (&'a mut Accel, &'a TracedScene),
         ring: &'a mut FrameRing,
         scene: BakeScene<'a>,
-        limits: Limits,
+        pace: &'a mut Pace,
     ) -> Self {
         Self {
-            device,
             accel,
             view,
             ring,
             scene,
             in_flight: VecDeque::new(),
             idle_since: Instant::now(),
-            pace: Pace::new(limits),
+            pace,
         }
     }
 
     fn all(
         mut self,
         work: &Work<'_>,
-        chunks: &mut Option<[Chunk; 2]>,
+        chunks: &[Chunk; 2],
         points: &[Point],
         progress: &mut dyn FnMut(f32),
     ) -> Result<Vec<Light>, Error> {
-        let chunks = match chunks {
-            Some(made) => made,
-            none => none.insert([Chunk::new(self.device)?, Chunk::new(self.device)?]),
-        };
         let mut found = Vec::with_capacity(points.len());
         if work.all == 0 {
             found.resize(points.len(), Light::default());
@@ -525,7 +457,8 @@ impl<'a> Run<'a> {
         let began = submitted.at.max(self.idle_since);
         self.idle_since = now;
         let took = now.saturating_duration_since(began);
-        (self.pace).measured(took, submitted.slice, submitted.is_first, all);
+        self.pace
+            .measured(took, submitted.slice, submitted.is_first, all);
         Ok(())
     }
 

@@ -5,13 +5,14 @@ use std::f32::consts::PI;
 use glam::Vec3;
 use q3bsp::{Bsp, Child};
 use relight::bake::{LitSurfaces, LitTriangle};
+use relight::calibrate::Surroundings;
 use relight::light::{Falloff, LightRef, PointLight};
 use shaders::trace_types as t;
 use shaders::trace_types::constants as c;
 
 use super::geometry::StaticGeometry;
 use super::lights::{Buffers, MapLightSource, count, ends, sun_light, triangle_light};
-use crate::gpu::{Buffer, Device, Error};
+use crate::gpu::{Buffer, BufferUsage, Device, Error};
 
 /// The lights of a map with the lists of its clusters.
 ///
@@ -207,6 +208,38 @@ impl BakeSurfaces {
         t::BakeView {
             lit,
             light,
+            records: geometry.triangles(),
+            ..t::BakeView::default()
+        }
+    }
+}
+
+/// The rays that measure how near surfaces are.
+pub struct BakeSurroundings {
+    _buffer: Buffer,
+    address: u64,
+    reach: f32,
+}
+
+impl BakeSurroundings {
+    /// Uploads them.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn new(device: &Device, around: &Surroundings) -> Result<Self, Error> {
+        let rays = Buffer::with_data(device, "bake rays", BufferUsage::STORAGE, &around.rays)?;
+        Ok(Self {
+            address: rays.address(),
+            _buffer: rays,
+            reach: around.reach,
+        })
+    }
+
+    /// What shaders read.
+    pub fn view(&self, geometry: &StaticGeometry) -> t::BakeView {
+        t::BakeView {
+            rays: self.address,
+            reach: self.reach,
             records: geometry.triangles(),
             ..t::BakeView::default()
         }

@@ -13,6 +13,7 @@ pub mod ahead;
 pub mod antialias;
 pub mod bake;
 mod bake_lights;
+pub mod bake_passes;
 pub mod beyond_sky;
 pub mod bloom;
 mod blue_noise;

@@ -105,8 +105,10 @@ pub struct BakeView {
     pub sun_count: u32,
     /// Directions over the sphere in which the sky is searched; 0: it gives no light.
     pub sky_directions: u32,
-    /// To a multiple of eight bytes.
-    pub padding: u32,
+    /// Length of the `rays`, units.
+    pub reach: f32,
+    /// Rays around a point: (c, s, a, b) is the direction (c u + s v) a + n b in the frame u, v, n of its normal n.
+    pub rays: u64,
 }
 
 /// Push constants of a pass that computes light at points.

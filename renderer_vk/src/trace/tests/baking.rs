@@ -9,7 +9,8 @@ use shaders::trace_types::SkyRecord;
 use shaders::types::constants as c;
 
 use super::harness::{Gpu, Scene, ceiling_at, floor_at, gpu_tests, lambert, rectangle, wall_at};
-use crate::trace::bake::{BakeScene, Baker, Limits};
+use crate::trace::bake::{BakeScene, Baker, Limits, Shared};
+use crate::trace::bake_passes::BakePasses;
 
 gpu_tests! {
     each: [
@@ -27,7 +28,6 @@ gpu_tests! {
         the_part_of_a_triangle_above_the_horizon_counts,
         points_without_surface_have_no_cosine,
         texels_and_vertices_are_found_where_they_are,
-        results_do_not_depend_on_chunks,
     ],
 }
 
@@ -39,7 +39,7 @@ fn on_floor(x: f32, y: f32) -> Point {
 }
 
 /// A scene seen from nowhere.
-fn scene() -> Scene {
+pub(super) fn scene() -> Scene {
     Scene::new(Vec3::ZERO, Vec3::X, 90.0, 8)
 }
 
@@ -64,11 +64,11 @@ fn sky_light_of(scene: &Scene, sources: &[u32]) -> Vec<Vec3> {
 }
 
 /// What computes light in a scene.
-fn with<T>(
+pub(super) fn with<T>(
     gpu: &mut Gpu,
     scene: &Scene,
     limits: Option<Limits>,
-    compute: impl FnOnce(&mut Baker, &mut crate::gpu::FrameRing, BakeScene<'_>) -> T,
+    compute: impl FnOnce(&mut Baker, &mut Shared<'_>, BakeScene<'_>) -> T,
 ) -> T {
     let uploaded = scene.upload(&gpu.device, gpu.tracer);
     let lists = scene.lists();
@@ -80,7 +80,12 @@ fn with<T>(
         geometry: &uploaded.geometry,
         materials: &uploaded.materials,
     };
-    let result = compute(&mut baker, &mut gpu.ring, lit);
+    let mut passes = BakePasses::new(&gpu.device, gpu.tracer);
+    let shared = &mut Shared {
+        ring: &mut gpu.ring,
+        passes: &mut passes,
+    };
+    let result = compute(&mut baker, shared, lit);
     gpu.device.wait_idle().expect("done");
     gpu.check_messages();
     result
@@ -88,9 +93,9 @@ fn with<T>(
 
 fn direct(gpu: &mut Gpu, scene: &Scene, points: &[Point], samples: u32) -> Vec<Light> {
     let mut last = 0.0;
-    let found = with(gpu, scene, None, |baker, ring, lit| {
+    let found = with(gpu, scene, None, |baker, shared, lit| {
         let progress = &mut |done| last = done;
-        baker.direct(ring, lit, points, samples, progress)
+        baker.direct(shared, lit, points, samples, progress)
     });
     let found = found.expect("light");
     assert_eq!(found.len(), points.len());
@@ -105,8 +110,8 @@ fn reflected(
     lit: &LitSurfaces<'_>,
     rays: u32,
 ) -> Vec<Light> {
-    let found = with(gpu, scene, None, |baker, ring, seen| {
-        baker.reflected(ring, seen, points, lit, rays, &mut |_| {})
+    let found = with(gpu, scene, None, |baker, shared, seen| {
+        baker.reflected(shared, seen, points, (lit, rays), &mut |_| {})
     });
     found.expect("light")
 }
@@ -432,7 +437,7 @@ fn points_without_surface_have_no_cosine(gpu: &mut Gpu) {
 }
 
 /// A triangle for each two of a scene's triangles, all with one texel of light, and their reflectance.
-fn uniform(scene: &Scene, reflectance: f32) -> (Vec<LitTriangle>, Vec<Vec3>) {
+pub(super) fn uniform(scene: &Scene, reflectance: f32) -> (Vec<LitTriangle>, Vec<Vec3>) {
     let count = scene.indices.len() / 3;
     let texels = LitTriangle::Texels {
         first: 0,
@@ -554,46 +559,4 @@ fn texels_and_vertices_are_found_where_they_are(gpu: &mut Gpu) {
     };
     let found = reflected(gpu, &scene, &points, &lit, 4);
     assert!(found.iter().all(|light| *light == Light::default()));
-}
-
-fn results_do_not_depend_on_chunks(gpu: &mut Gpu) {
-    let mut scene = Scene::hall(0.0, 0.5, 8);
-    for i in 0..9 {
-        scene.lamp(
-            Vec3::new(-150.0 + 30.0 * i as f32, -60.0, 110.0),
-            25.0,
-            Vec3::ONE,
-        );
-    }
-    scene.point(Vec3::new(0.0, 60.0, 60.0), 3000.0, 6.0);
-    let points: Vec<Point> = (0..900)
-        .map(|i| Point {
-            position: Vec3::new(
-                (i % 30) as f32 * 12.0 - 180.0,
-                (i / 30) as f32 * 9.0 - 140.0,
-                -79.9,
-            ),
-            normal: Vec3::Z,
-        })
-        .collect();
-    let (triangles, reflectances) = uniform(&scene, 0.7);
-    let lit = LitSurfaces {
-        triangles: &triangles,
-        reflectances: &reflectances,
-        light: &[Vec3::ONE],
-    };
-    let mut both = |limits: Option<Limits>| {
-        with(gpu, &scene, limits, |baker, ring, seen| {
-            let nothing = &mut |_| {};
-            let direct = baker.direct(ring, seen, &points, 4, nothing);
-            let reflected = baker.reflected(ring, seen, &points, &lit, 7, nothing);
-            (direct.expect("light"), reflected.expect("light"))
-        })
-    };
-    let whole = both(None);
-    for (points, slice) in [(100, 1), (333, 3), (1, u32::MAX)] {
-        assert_eq!(whole, both(Some(Limits { points, slice })));
-    }
-    let lit = whole.0.iter().filter(|light| light.value.x > 0.0).count();
-    assert!(lit > 500, "{lit} points are lit");
 }

@@ -4,6 +4,7 @@
 mod ambient;
 mod antialias_variants;
 mod antialiasing;
+mod bake_points;
 mod baking;
 mod blooming;
 mod bounces;
