@@ -4,32 +4,32 @@ mod computer;
 mod loading;
 mod output;
 mod permits;
+mod report;
 mod times;
 
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use q3bsp::Bsp;
-use relight::RelitWorld;
 use relight::bake::store;
-use relight::bake::store::deluxe::{DirectionSpace, interleave};
-use relight::bake::store::external::{numbered, scripted};
-use relight::bake::{
-    BakeOptions, Baked, BakedPage, Gather, Page, Stored, bake, light_bytes, seams,
-};
+use relight::bake::store::deluxe;
+use relight::bake::store::external::{image_file, numbered, scripted};
+use relight::bake::{BakeOptions, Baked, Gather, Page, Stored, bake, seams};
 use relight::calibrate::Dirt;
+use relight::{GameFiles, RelitWorld};
 
 use crate::game::Maps;
 use crate::numbers::positive;
 use crate::viewer::cache_folder;
 use computer::Computer;
-use loading::{Loaded, Source};
-use output::is_pack;
+use loading::{Deluxe, Loaded, Source};
+use output::{Format, MapOutput, Outputs};
 use permits::Permits;
+use report::report;
 use times::Times;
 
 /// Compute the light of maps, and write it into them
@@ -38,14 +38,17 @@ use times::Times;
 /// finished map comes from sources that calibration finds; that of a map without lightmaps from its scripts and entities.
 ///
 /// Examples: relight bake oa_dm1 -o z_oa_dm1_relit.pk3 --texels 4; relight bake mymap.bsp -o mymap.bsp --bounce 4;
-/// relight bake oa_dm1 kaos2 -o baked
+/// relight bake oa_dm1 kaos2 -o z_relit.pk3
 #[derive(Args, Debug)]
 pub struct BakeArgs {
     #[command(flatten)]
     maps: Maps,
-    /// Output file, .bsp or .pk3, or for several maps the folder
+    /// Output file, .bsp or .pk3; for several maps a folder, or one .pk3 with all of them, which is written at the end
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
+    /// Format; default: that of the output's extension, else the first
+    #[arg(long)]
+    format: Option<Format>,
     /// Do not fit lights to the map's lightmaps first (the game does)
     #[arg(long)]
     no_calibration: bool,
@@ -86,10 +89,20 @@ pub struct BakeArgs {
     /// Darken places near surfaces, as the compiler's -dirty; bounces do that without it
     #[arg(long)]
     dirty: bool,
+    /// Distance in units within which surfaces darken, as the compiler's -dirtdepth; default: 128
+    #[arg(long, value_name = "UNITS", requires = "dirty", value_parser = positive)]
+    dirt_depth: Option<f32>,
+    /// Factor of that darkness, as the compiler's -dirtscale; default: 1
+    #[arg(long, value_name = "F", requires = "dirty", value_parser = positive)]
+    dirt_scale: Option<f32>,
+    /// Exponent of that darkness, as the compiler's -dirtgain; default: 1
+    #[arg(long, value_name = "E", requires = "dirty", value_parser = positive)]
+    dirt_gain: Option<f32>,
     /// Write the output early with direct light, and again with a bounce, before it is done
     #[arg(long)]
     preview: bool,
-    /// Write pages of directions to the light between those of light, for engines with deluxe mapping
+    /// Write pages of directions to the light between those of light, for engines with deluxe mapping; a map that has some
+    /// gets them anyway
     #[arg(long)]
     deluxe: bool,
 }
@@ -122,14 +135,8 @@ pub fn run(args: &BakeArgs) -> Result<()> {
     let computer = Computer::begin(args.device.as_deref(), cache.as_deref());
     let permits = Permits::new(LIT_AT_ONCE);
     let several = args.maps.maps.len() > 1;
-    let output = |map: &str| match several {
-        true => {
-            let stem = Path::new(map).file_stem().unwrap_or_default();
-            args.output.join(stem).with_extension("bsp")
-        }
-        false => args.output.clone(),
-    };
-    let queue = Mutex::new(args.maps.maps.iter());
+    let outputs = Outputs::of(&args.maps.maps, &args.output, args.format)?;
+    let queue = Mutex::new(args.maps.maps.iter().enumerate());
     let failed: Mutex<Option<anyhow::Error>> = Mutex::new(None);
     let failure = || failed.lock().unwrap_or_else(PoisonError::into_inner);
     let has_failed = || failure().is_some();
@@ -138,10 +145,13 @@ pub fn run(args: &BakeArgs) -> Result<()> {
         false => queue.lock().unwrap_or_else(PoisonError::into_inner).next(),
     };
     let work = || {
-        while let Some(map) = next() {
+        while let Some((number, map)) = next() {
+            let Some(output) = outputs.of_map(number) else {
+                continue;
+            };
             let mut times = Times::new(!several);
             let shared = (&computer, &permits);
-            if let Err(error) = bake_map(args, map, &output(map), shared, &mut times) {
+            if let Err(error) = bake_map(args, map, &output, shared, &mut times) {
                 failure().get_or_insert(error);
             }
         }
@@ -157,14 +167,15 @@ pub fn run(args: &BakeArgs) -> Result<()> {
         work();
     });
     let failed = failure().take();
-    failed.map_or(Ok(()), Err)
+    failed.map_or(Ok(()), Err)?;
+    outputs.finish()
 }
 
 /// Bakes one map.
 fn bake_map(
     args: &BakeArgs,
     map: &str,
-    output: &Path,
+    output: &MapOutput<'_>,
     (computer, permits): (&Computer, &Permits),
     times: &mut Times,
 ) -> Result<()> {
@@ -174,6 +185,7 @@ fn bake_map(
         map,
         laid_out,
         external,
+        deluxe,
     } = loading::load(args, map, times)?;
     times.begin("waiting");
     let _permit = permits.take();
@@ -184,16 +196,16 @@ fn bake_map(
         map: &map,
         laid_out,
         external,
-        deluxe: args.deluxe,
+        deluxe,
         output,
     };
     let options = options(args, &world);
-    if args.preview {
+    if args.preview && output.is_own() {
         for early in early_rounds(&options) {
             job.round(&mut gather, &early, times)?;
             println!(
                 "{}: {:.1} s: {} of {} bounces",
-                output.display(),
+                output.path().display(),
                 times.seconds(),
                 early.bounces,
                 options.bounces
@@ -208,17 +220,10 @@ fn bake_map(
         gather.waited.as_secs_f64(),
         gather.name()
     );
-    let outside = baked.pages_outside(&map);
-    report(
-        &source,
-        &stored,
-        &baked,
-        outside,
-        (!laid_out).then_some(&pages),
-    );
+    report(&source, &stored, &baked, (!laid_out).then_some(&pages));
     println!(
         "{}: {:.1} s, by {}",
-        output.display(),
+        output.path().display(),
         times.seconds(),
         gather.name(),
     );
@@ -251,19 +256,11 @@ struct Job<'a> {
     map: &'a Bsp,
     laid_out: bool,
     external: Option<External>,
-    deluxe: bool,
-    output: &'a Path,
+    deluxe: Deluxe,
+    output: &'a MapOutput<'a>,
 }
 
 impl Job<'_> {
-    /// Game path of the map that is written: a pack replaces the map, and a `.bsp` file has the name of the output.
-    fn name(&self) -> String {
-        match self.output.file_stem() {
-            Some(stem) if !is_pack(self.output) => format!("maps/{}.bsp", stem.to_string_lossy()),
-            _ => self.source.name.clone(),
-        }
-    }
-
     /// Bakes with these options, and writes the output.
     fn round(
         &self,
@@ -292,26 +289,33 @@ impl Job<'_> {
                 source.name
             );
         }
-        let all = match self.deluxe {
-            true => {
-                let space = DirectionSpace::Model;
-                let directions = baked.directions(world, &map, space);
-                interleave(&mut map, pages.clone(), directions, space)
+        let mut all = pages.clone();
+        if let Some(space) = self.deluxe.space() {
+            let directions = baked.directions(&map, space);
+            match self.deluxe.stored.is_some() && !self.laid_out {
+                true => deluxe::replace(&mut all, directions),
+                false => all = deluxe::interleave(&mut map, all, directions, space),
             }
-            false => pages.clone(),
-        };
-        let beside = match self.external {
+        }
+        let name = self.output.map_name(&source.name);
+        let mut beside = match self.external {
             None => {
                 store::internal(&mut map, &all)?;
                 Vec::new()
             }
-            Some(External::Numbered) => numbered(&mut map, &self.name(), &all)?,
+            Some(External::Numbered) => numbered(&mut map, &name, &all)?,
             Some(External::Scripted) => {
-                let (files, materials) = (&*source.files, &source.materials);
-                scripted(&mut map, &self.name(), &all, files, materials)?
+                let game: (&dyn GameFiles, _) = (&*source.files, &*source.materials);
+                scripted(&mut map, &name, &all, game, &loading::taken(world))?
             }
         };
-        output::write(source, &map, &beside, self.output)?;
+        for (path, page) in baked.images(world, encoding) {
+            match image_file(&path, &page) {
+                Some(file) => beside.push(file),
+                None => log::warn!("{path}: images of this kind stay as they are"),
+            }
+        }
+        self.output.write(source, &map, &beside)?;
         Ok((baked, pages, stored))
     }
 }
@@ -326,65 +330,16 @@ fn options(args: &BakeArgs, world: &RelitWorld) -> BakeOptions {
     options.bounces = args.bounce.unwrap_or(options.bounces);
     options.grid = !args.no_grid;
     if args.dirty {
-        options.dirt = options.dirt.or(Some(Dirt::DEFAULT));
+        let usual = options.dirt.unwrap_or(Dirt::DEFAULT);
+        options.dirt = Some(Dirt {
+            depth: args.dirt_depth.unwrap_or(usual.depth),
+            scale: args.dirt_scale.unwrap_or(usual.scale),
+            gain: args.dirt_gain.unwrap_or(usual.gain),
+        });
     }
     if let Some(gamma) = args.gamma {
         options.encoding.set_gamma(gamma);
     }
     options.encoding.compensate = args.compensate;
     options
-}
-
-/// Prints what was baked; for a map that keeps its coordinates also how far its pages are from those that it had.
-fn report(
-    source: &Source,
-    stored: &Stored,
-    baked: &Baked,
-    outside: usize,
-    pages: Option<&Vec<Page>>,
-) {
-    let name = &source.name;
-    let lit = |page: &BakedPage| page.owners.iter().filter(|o| **o != u32::MAX).count();
-    let texels: usize = baked.pages.iter().map(lit).sum();
-    println!(
-        "{name}: {} pages ({texels} texels), {} vertices, {} points of the light grid",
-        baked.pages.len(),
-        stored.vertices,
-        stored.grid
-    );
-    if baked.unlit > 0 {
-        log::warn!(
-            "{name}: {} texels and vertices lie in solid and take the light of their neighbours",
-            baked.unlit
-        );
-    }
-    if outside > 0 {
-        log::warn!("{name}: {outside} lightmap images that scripts name stay as they are");
-    }
-    let mut differences: Vec<u8> = Vec::new();
-    for baked in &baked.pages {
-        let old = source.bsp.lightmaps.get(baked.number);
-        let new = pages.and_then(|pages| pages.get(baked.number));
-        let (Some(old), Some(new)) = (old, new) else {
-            continue;
-        };
-        let texels = old.0.as_chunks::<3>().0.iter().zip(&new.texels);
-        let covered = texels.zip(&baked.owners).filter(|(_, o)| **o != u32::MAX);
-        differences.extend(covered.flat_map(|((old, new), _)| {
-            let new = light_bytes(*new);
-            (0..3).map(move |k| old[k].abs_diff(new[k]))
-        }));
-    }
-    if !differences.is_empty() {
-        differences.sort_unstable();
-        let at = |part: usize| {
-            let place = differences.len() * part / 100;
-            differences.get(place).copied().unwrap_or(0)
-        };
-        println!(
-            "{name}: lightmaps differ by {}/255 in the median from those that it had, 90 % by at most {}",
-            at(50),
-            at(90)
-        );
-    }
 }

@@ -276,6 +276,26 @@ fn a_bake_writes_a_whole_map_or_leaves_the_file_that_is_there() {
         "{refused:?}"
     );
     assert_eq!(std::fs::read(&baked).unwrap(), bytes);
+
+    // one pack of several maps, whole or as it was; and a pack each
+    let all = path("z_all.pk3");
+    let quick = ["--fast", "--no-calibration"];
+    let second = path("hall2.bsp");
+    std::fs::write(&second, &bytes).unwrap();
+    let done = bake(&pack, &all, &[&quick[..], &[&second]].concat());
+    assert!(done.status.success(), "{done:?}");
+    use relight::GameFiles;
+    let relit = relight::Pk3::open(std::path::Path::new(&all)).unwrap();
+    assert!(relit.exists("maps/sample.bsp") && relit.exists("maps/hall2.bsp"));
+    let whole = std::fs::read(&all).unwrap();
+    let refused = bake(&second, &all, &[&quick[..], &[&broken]].concat());
+    assert!(!refused.status.success());
+    assert_eq!(std::fs::read(&all).unwrap(), whole);
+    let each = path("each");
+    let packs = [&quick[..], &["--format", "pk3"]].concat();
+    assert!(bake(&second, &each, &packs).status.success());
+    assert!(folder.path().join("each/z_hall2_relit.pk3").is_file());
+
     let left = std::fs::read_dir(folder.path()).unwrap().count();
-    assert_eq!(left, 6, "a temporary file is left");
+    assert_eq!(left, 9, "a temporary file is left");
 }

@@ -230,6 +230,7 @@ impl RelitWorld {
             triangle_lights: vec![NO_LIGHT; geometry.indices.len() / 3],
             indices: geometry.indices,
             pages: pages.pages,
+            files_of_pages: pages.files_of_pages,
             flares,
             by_hand: MaterialsByHand::default(),
             fogs,

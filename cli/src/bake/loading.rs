@@ -1,16 +1,20 @@
 //! Loads the maps of `relight bake` with their lights, and lays their lightmaps out.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use q3bsp::Bsp;
 use relight::bake::layout::{self, LayoutOptions, LightmapUse, PageSides};
+use relight::bake::store::deluxe::{self, DirectionSpace};
 use relight::light::LightColor;
+use relight::materials::light::baked_light;
 use relight::{
     CalibrationCache, CalibrationOptions, GameFiles, Materials, Options, RelitWorld, Stage,
-    external_lightmaps,
+    WorldSurface, external_lightmaps,
 };
+use shaderscript::StageImage;
 
 use super::times::Times;
 use super::{BakeArgs, External};
@@ -43,6 +47,25 @@ pub struct Loaded {
     pub laid_out: bool,
     /// How its pages are stored beside it.
     pub external: Option<External>,
+    /// Pages of directions.
+    pub deluxe: Deluxe,
+}
+
+/// Pages of directions to the light.
+#[derive(Clone, Copy, Debug)]
+pub struct Deluxe {
+    /// The axes of those that the map has.
+    pub stored: Option<DirectionSpace>,
+    /// Whether they are wanted in any case.
+    wanted: bool,
+}
+
+impl Deluxe {
+    /// The axes of those that are written, if any are.
+    pub fn space(self) -> Option<DirectionSpace> {
+        let usual = self.wanted.then(DirectionSpace::default);
+        self.stored.or(usual)
+    }
 }
 
 /// Loads a map.
@@ -76,13 +99,27 @@ pub fn load(args: &BakeArgs, map: &str, times: &mut Times) -> Result<Loaded> {
     let mut changed = source.bsp.clone();
     // numbered images beside the map are its pages
     let mut external = args.external;
-    if external_lightmaps(&mut changed, &*source.files, &source.name).is_ok_and(|count| count > 0) {
-        external = external.or(Some(External::Numbered));
+    let found = external_lightmaps(&mut changed, &*source.files, &source.name);
+    if found.is_ok_and(|count| count > 0) {
+        match layout::has_layout(&changed) {
+            true => external = external.or(Some(External::Numbered)),
+            // scripts name these images
+            false => changed = source.bsp.clone(),
+        }
     }
+    let deluxe = Deluxe {
+        stored: deluxe::space_of(&changed),
+        wanted: args.deluxe,
+    };
     times.begin("layout");
     let laid_out = args.texels.is_some() || args.external.is_some() || !has_pages(&world);
     if laid_out {
-        lay_out(args, &source, &mut changed)?;
+        let images = images_of_materials(&world);
+        if !images.is_empty() {
+            // scripts name these images, and new ones name the new images
+            external = external.or(Some(External::Scripted));
+        }
+        lay_out(args, &source, &mut changed, (external, &images))?;
         times.begin("world of the layout");
         world = with_layout(&source, &changed, world);
     }
@@ -103,6 +140,7 @@ pub fn load(args: &BakeArgs, map: &str, times: &mut Times) -> Result<Loaded> {
         map: changed,
         laid_out,
         external,
+        deluxe,
     })
 }
 
@@ -111,10 +149,51 @@ fn has_pages(world: &RelitWorld) -> bool {
     world.surfaces.iter().any(|surface| surface.light_page >= 0)
 }
 
+/// Materials that show an image in place of a page of the map, with its texels per side.
+fn images_of_materials(world: &RelitWorld) -> BTreeMap<String, u32> {
+    let image = |(index, surface): (usize, &WorldSurface)| {
+        let page = usize::try_from(surface.light_page).ok()?;
+        let outside = page >= world.bsp.lightmaps.len();
+        let side = world.page(page).filter(|_| outside)?.size();
+        let shader = world.bsp.surfaces.get(index)?.shader;
+        Some((
+            world.bsp.shader(shader).name.clone(),
+            u32::try_from(side).ok()?,
+        ))
+    };
+    world
+        .surfaces
+        .iter()
+        .enumerate()
+        .filter_map(image)
+        .collect()
+}
+
+/// Paths of the images that scripts name and surfaces of a world show, in lower case.
+pub fn taken(world: &RelitWorld) -> BTreeSet<String> {
+    let number = |surface: &WorldSurface| {
+        let page = usize::try_from(surface.light_page).ok()?;
+        page.checked_sub(world.bsp.lightmaps.len())
+    };
+    let shown = world.surfaces.iter().filter_map(number);
+    shown
+        .filter_map(|page| Some(world.files_of_pages.get(page)?.to_ascii_lowercase()))
+        .collect()
+}
+
 /// Gives a map new lightmap coordinates.
-fn lay_out(args: &BakeArgs, source: &Source, bsp: &mut Bsp) -> Result<()> {
-    let material = |name: &str| LightmapUse::of(&source.materials, name);
-    let usual = match args.external {
+fn lay_out(
+    args: &BakeArgs,
+    source: &Source,
+    bsp: &mut Bsp,
+    (external, images): (Option<External>, &BTreeMap<String, u32>),
+) -> Result<()> {
+    let scripted = external == Some(External::Scripted);
+    let material = |name: &str| LightmapUse {
+        image: images.get(name).copied().filter(|_| scripted),
+        ..LightmapUse::of(&source.materials, name)
+    };
+    let usual = match external {
         Some(_) => LayoutOptions::external(&material),
         None => LayoutOptions {
             sides: PageSides::Fixed(bsp.format.lightmap_size() as u32),
@@ -141,7 +220,7 @@ fn lay_out(args: &BakeArgs, source: &Source, bsp: &mut Bsp) -> Result<()> {
             laid.coarser.len()
         );
     }
-    if !laid.styled.is_empty() && args.external != Some(External::Scripted) {
+    if !laid.styled.is_empty() && !scripted {
         log::warn!(
             "{}: {} surfaces lose the light of their light styles; --external leaves their stages out",
             source.name,
@@ -165,6 +244,12 @@ fn with_layout(source: &Source, bsp: &Bsp, before: RelitWorld) -> RelitWorld {
     // materials by hand; the lights are replaced
     world.read_by_hand(files);
     world.set_lighting(before.lighting());
+    // a page in place of the image that the script names
+    for (surface, stored) in world.surfaces.iter_mut().zip(&bsp.surfaces) {
+        if stored.lightmap >= 0 && surface.light_page >= 0 {
+            surface.light_page = stored.lightmap;
+        }
+    }
     world
 }
 
@@ -184,6 +269,19 @@ fn add_lights_of_source(bsp: &mut Bsp, map: &str) -> Result<bool> {
     Ok(true)
 }
 
+/// Whether scripts of a map's materials name images of its light.
+fn names_images(source: &Source) -> bool {
+    let library = source.materials.library();
+    let used = source.bsp.surfaces.iter();
+    let used: BTreeSet<_> = used.map(|s| &source.bsp.shader(s.shader).name).collect();
+    let stages = used.into_iter().filter_map(|name| library.find(name));
+    stages.map(|shader| &shader.stages).any(|stages| {
+        let light = baked_light(stages);
+        let mut shown = stages.iter().zip(light);
+        shown.any(|(stage, light)| light.is_some() && stage.image != StageImage::Lightmap)
+    })
+}
+
 /// Loads a map with light as it is stored. `is_own`: its lights are known.
 fn load_world(
     args: &BakeArgs,
@@ -194,8 +292,8 @@ fn load_world(
 ) -> RelitWorld {
     let files = &*source.files;
     let external = external_lightmaps(&mut bsp, files, &source.name);
-    let stored = !bsp.lightmaps.is_empty() && !args.no_calibration && !is_own;
-    let calibrate = stored.then(|| CalibrationOptions {
+    let stored = !bsp.lightmaps.is_empty() || names_images(source);
+    let calibrate = (stored && !args.no_calibration && !is_own).then(|| CalibrationOptions {
         cache: args.cache.as_ref().map(CalibrationCache::new),
         ..CalibrationOptions::default()
     });

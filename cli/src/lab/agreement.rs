@@ -11,6 +11,7 @@ use clap::Args;
 use glam::Vec3;
 use q3bsp::{Bsp, GridPoint};
 use relight::SearchPath;
+use relight::bake::store::deluxe;
 use relight::compare::Rgb8;
 use serde::Serialize;
 
@@ -24,7 +25,7 @@ use crate::pictures;
 /// lightmap, and points of the light grid. Light is linear, as map compilers compute it: 255 is the brightest. For each
 /// the median of the second map's luminance over the first's (bias), the median and the 95th percentile of its absolute
 /// value, in stops; the percentage within half a stop; and the largest difference of a channel in bytes. Luminance
-/// below --floor counts as equally dark. Lightmaps beside a map (lm_0000.tga) are read where it has none inside.
+/// below --floor counts as equally dark. Of deluxe maps the angles between the directions at covered texels. Lightmaps beside a map (lm_0000.tga) are read where it has none inside.
 ///
 /// Example: relight-lab agreement q3map2/fan.bsp ours/fan.bsp -o fan.png
 #[derive(Args, Debug)]
@@ -65,6 +66,8 @@ struct Report {
     grid_directed: Option<Differences>,
     /// Median and 95th percentile of the angle between directions of the grid, degrees.
     grid_degrees: Option<[f64; 2]>,
+    /// Median and 95th percentile of the angle between the directions of deluxe maps, degrees.
+    deluxe_degrees: Option<[f64; 2]>,
     materials: Vec<(String, Differences)>,
 }
 
@@ -153,6 +156,11 @@ fn report(args: &AgreementArgs, a: &Bsp, b: &Bsp, pages: &[Vec<u32>]) -> Report 
         .filter(|(p, q)| p.directed != [0; 3] && q.directed != [0; 3])
         .map(|(p, q)| direction(p).angle_between(direction(q)).to_degrees())
         .collect();
+    let mut turned = deluxe_angles(a, b, pages);
+    let of_angles = |angles: &mut Vec<f32>| {
+        let median = percentile(angles, 0.5)?;
+        Some([median, percentile(angles, 0.95)?])
+    };
     Report {
         a: args.a.display().to_string(),
         b: args.b.display().to_string(),
@@ -161,11 +169,30 @@ fn report(args: &AgreementArgs, a: &Bsp, b: &Bsp, pages: &[Vec<u32>]) -> Report 
         vertices: Differences::of(&vertices(a, b), decoding),
         grid_ambient: of(|p| p.ambient),
         grid_directed: of(|p| p.directed),
-        grid_degrees: percentile(&mut angles, 0.5)
-            .zip(percentile(&mut angles, 0.95))
-            .map(|(median, p95)| [median, p95]),
+        grid_degrees: of_angles(&mut angles),
+        deluxe_degrees: of_angles(&mut turned),
         materials,
     }
+}
+
+/// Angles between the directions at covered texels, degrees; none if one of the maps has no deluxe maps.
+fn deluxe_angles(a: &Bsp, b: &Bsp, pages: &[Vec<u32>]) -> Vec<f32> {
+    if deluxe::space_of(a).is_none() || deluxe::space_of(b).is_none() {
+        return Vec::new();
+    }
+    let mut found = Vec::new();
+    let odd = a.lightmaps.iter().zip(&b.lightmaps).skip(1).step_by(2);
+    for ((p, q), page) in odd.zip(pages.iter().step_by(2)) {
+        let texels = p.0.as_chunks::<3>().0.iter().zip(q.0.as_chunks::<3>().0);
+        let covered = texels
+            .zip(page)
+            .filter(|(_, surface)| **surface != u32::MAX);
+        found.extend(covered.map(|((p, q), _)| {
+            let (p, q) = (deluxe::direction(*p), deluxe::direction(*q));
+            p.angle_between(q).to_degrees()
+        }));
+    }
+    found
 }
 
 /// Covered texels of both maps, with their surface.
@@ -254,6 +281,9 @@ fn print(report: &Report) {
     }
     if let Some([median, p95]) = report.grid_degrees {
         println!("grid, direction: median {median:.1} degrees, 95 % {p95:.1}");
+    }
+    if let Some([median, p95]) = report.deluxe_degrees {
+        println!("deluxe maps, direction: median {median:.1} degrees, 95 % {p95:.1}");
     }
     for (name, differences) in &report.materials {
         println!("{}", differences.row(name));
@@ -347,6 +377,20 @@ mod tests {
         assert!(error.contains("surface 0"), "{error}");
         b.surfaces.pop();
         assert!(same_layout(&a, &b).is_err());
+    }
+
+    #[test]
+    fn directions_of_deluxe_maps_are_compared() {
+        let (mut a, mut b) = (room(), room());
+        for (map, texel) in [(&mut a, [127, 127, 255]), (&mut b, [127, 255, 127])] {
+            map.lightmaps.truncate(1);
+            let size = map.lightmap_size();
+            map.lightmaps
+                .push(Lightmap(texel.repeat(size * size).into()));
+        }
+        let report = report(&args(), &a, &b, &covered(&a));
+        let [median, p95] = report.deluxe_degrees.unwrap();
+        assert!((median - 90.0).abs() < 1.0 && median == p95, "{median}");
     }
 
     #[test]

@@ -19,6 +19,8 @@ pub struct Encoding {
     pub compensate: f32,
     /// Whether values are half a step lower, so that the bytes after rounding are those that q3map2 cuts off.
     pub truncates: bool,
+    /// Whether the factor of a material follows gamma, as in q3map2 since 2.5.17n; before, gamma followed it.
+    pub scales_last: bool,
     /// Exponent that ratios of the channels were raised to when the world was loaded.
     pub exponent: f32,
 }
@@ -33,6 +35,7 @@ impl Encoding {
             gamma: world.stored_gamma,
             compensate: 1.0,
             truncates: world.calibration.is_none(),
+            scales_last: world.calibration.is_none(),
             exponent: world.color_exponent / world.stored_gamma,
         }
     }
@@ -50,13 +53,17 @@ impl Encoding {
         let light = match self.exponent == 1.0 {
             true => light.max(Vec3::ZERO),
             false => raise(light, self.exponent.recip()),
-        } * scale;
-        let part = light / self.full;
+        };
+        let (before, after) = match self.scales_last {
+            true => (1.0, scale),
+            false => (scale, 1.0),
+        };
+        let part = light * before / self.full;
         let encoded = match self.gamma == 1.0 {
             true => part,
             false => part.powf(self.gamma.recip()),
         };
-        let value = encoded / self.compensate;
+        let value = encoded * after / self.compensate;
         // rounded later
         match self.truncates {
             true => (value - 0.5 / 255.0).max(Vec3::ZERO),
@@ -79,6 +86,7 @@ mod tests {
         gamma: 1.0,
         compensate: 1.0,
         truncates: false,
+        scales_last: true,
         exponent: 1.0,
     };
 
@@ -112,5 +120,12 @@ mod tests {
             let light = (f32::from(value) * OVERBRIGHT / 255.0).powf(2.0);
             assert_eq!(encoding.bytes(Vec3::splat(light), 1.0), [value; 3]);
         }
+        let light = Vec3::splat((100.0 * OVERBRIGHT / 255.0).powf(2.0));
+        assert_eq!(encoding.bytes(light, 0.25), [25; 3]);
+        let scaled_first = Encoding {
+            scales_last: false,
+            ..encoding
+        };
+        assert_eq!(scaled_first.bytes(light, 0.25), [50; 3]);
     }
 }

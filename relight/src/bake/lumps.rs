@@ -3,6 +3,7 @@
 use super::page::Page;
 use super::store::deluxe::{DirectionSpace, direction_texel};
 use super::{Baked, BakedPage, Encoding};
+use crate::overbright::MAP_OVERBRIGHT_BITS;
 use crate::world::{RelitWorld, WorldSurface};
 use glam::{Vec2, Vec3};
 use q3bsp::{Bsp, Lightmap, SurfaceKind};
@@ -22,12 +23,6 @@ pub struct Stored {
 impl Baked {
     /// Pages of stored light for a map, one for each that it has. Texels that no surface shows stay as they are.
     pub fn pages(&self, world: &RelitWorld, bsp: &Bsp, encoding: Encoding) -> Vec<Page> {
-        let as_it_was = |page: &Lightmap| Page {
-            side: page.size(),
-            texels: (page.0.as_chunks::<3>().0.iter())
-                .map(|texel| Vec3::from_array(texel.map(f32::from)) / 255.0)
-                .collect(),
-        };
         let of_number: HashMap<usize, &BakedPage> =
             self.pages.iter().map(|page| (page.number, page)).collect();
         parallel::map(&bsp.lightmaps, |number, before| {
@@ -47,7 +42,7 @@ impl Baked {
 
     /// Pages of directions to the light, for a map with these pages; see
     /// [`store::deluxe`](super::store::deluxe).
-    pub fn directions(&self, world: &RelitWorld, bsp: &Bsp, space: DirectionSpace) -> Vec<Page> {
+    pub fn directions(&self, bsp: &Bsp, space: DirectionSpace) -> Vec<Page> {
         let blank = |page: &Lightmap| Page {
             side: page.size(),
             texels: vec![direction_texel(Vec3::ZERO, Vec3::Z, space); page.size() * page.size()],
@@ -57,21 +52,37 @@ impl Baked {
             let Some(page) = pages.get_mut(baked.number) else {
                 continue;
             };
-            let texels = page.texels.iter_mut();
-            for ((texel, light), &owner) in texels.zip(&baked.light).zip(&baked.owners) {
-                if let Some(surface) = world.surfaces.get(owner as usize) {
-                    let normal = surface.plane.map_or(light.towards, |plane| plane.normal);
-                    *texel = direction_texel(light.towards, normal.normalize_or(Vec3::Z), space);
+            let texels = page.texels.iter_mut().zip(&baked.normals);
+            for (((texel, &normal), light), &owner) in texels.zip(&baked.light).zip(&baked.owners) {
+                if owner != u32::MAX {
+                    *texel = direction_texel(light.towards, normal, space);
                 }
             }
         }
         pages
     }
 
-    /// Number of pages that scripts name: images outside of the map, which [`pages`](Self::pages) does not have.
-    pub fn pages_outside(&self, bsp: &Bsp) -> usize {
-        let outside = |page: &&BakedPage| page.number >= bsp.lightmaps.len();
-        self.pages.iter().filter(outside).count()
+    /// Pages that scripts name, with the game paths of their images, which [`pages`](Self::pages) does not have. Their values
+    /// are as engines show them where the world is calibrated; else as the compiler stores them, so that authors scale them by
+    /// `q3map_lightmapBrightness`.
+    pub fn images(&self, world: &RelitWorld, encoding: Encoding) -> Vec<(String, Page)> {
+        let scale = match world.calibration.is_some() {
+            true => (1 << MAP_OVERBRIGHT_BITS) as f32,
+            false => 1.0,
+        };
+        let image = |baked: &BakedPage| {
+            let at = baked.number.checked_sub(world.bsp.lightmaps.len())?;
+            let path = world.files_of_pages.get(at)?.clone();
+            let mut page = as_it_was(world.page(baked.number)?);
+            let texels = page.texels.iter_mut();
+            for ((texel, light), &owner) in texels.zip(&baked.light).zip(&baked.owners) {
+                if owner != u32::MAX {
+                    *texel = encoding.stored(light.value, scale_of(world, owner)) * scale;
+                }
+            }
+            Some((path, page))
+        };
+        self.pages.iter().filter_map(image).collect()
     }
 
     /// Writes the light of vertices and of the grid into a map: the one of the world, or one with the same surfaces and
@@ -97,6 +108,16 @@ impl Baked {
             stored.grid = grid.len();
         }
         stored
+    }
+}
+
+/// A page with the values that it has.
+fn as_it_was(page: &Lightmap) -> Page {
+    Page {
+        side: page.size(),
+        texels: (page.0.as_chunks::<3>().0.iter())
+            .map(|texel| Vec3::from_array(texel.map(f32::from)) / 255.0)
+            .collect(),
     }
 }
 
@@ -173,4 +194,77 @@ fn near(page: &BakedPage, at: Vec2) -> Option<Vec3> {
         }
     }
     best.map(|(_, light)| light)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::layout::{LayoutOptions, LightmapUse, make};
+    use super::super::{BakeOptions, Rays, bake};
+    use crate::files::MemoryFiles;
+    use crate::image::tests::rgb_tga;
+    use crate::load::Options;
+    use crate::materials::Materials;
+    use crate::world::RelitWorld;
+    use glam::{Vec2, Vec3};
+    use q3bsp::builder::MapBuilder;
+
+    const IMAGE: &str = "maps/m/lm_0007.tga";
+
+    #[test]
+    fn images_that_scripts_name_get_light_and_charts() {
+        let mut map = MapBuilder::new();
+        let wall = map.add_shader("t/wall", 0, 1);
+        map.add_room(wall, Vec3::splat(-128.0), Vec3::splat(128.0));
+        map.add_entity(&[
+            ("classname", "light"),
+            ("light", "200"),
+            ("origin", "0 0 0"),
+        ]);
+        let mut bsp = map.build();
+        bsp.surfaces.iter_mut().for_each(|s| s.lightmap = -3);
+        let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+        for (vertex, (s, t)) in bsp.vertices.iter_mut().zip(corners.into_iter().cycle()) {
+            vertex.lightmap = Vec2::new(s, t);
+        }
+        let mut files = MemoryFiles::new();
+        let script = format!(
+            "t/wall\n{{\n{{\nmap {IMAGE}\ntcGen lightmap\n}}\n{{\nmap t/wall.tga\nblendFunc filter\n}}\n}}\n"
+        );
+        files
+            .insert("scripts/a.shader", script.into_bytes())
+            .unwrap();
+        files.insert(IMAGE, rgb_tga(16, 16, &[9; 768])).unwrap();
+        let wall = rgb_tga(1, 1, &[9; 3]);
+        files.insert("t/wall.tga", wall).unwrap();
+        let (materials, _) = Materials::load(&files);
+        let options = Options {
+            calibrate: None,
+            ..Options::default()
+        };
+        let mut world =
+            RelitWorld::from_bsp(&files, &materials, "maps/m.bsp", bsp.clone(), options);
+        world.take_compiled_lights(&files);
+        let options = BakeOptions {
+            pattern: 1,
+            samples: 0,
+            bounces: 0,
+            ..BakeOptions::of(&world)
+        };
+        let baked = bake(&world, &mut Rays::new(&world), &options, &mut |_, _| ()).unwrap();
+        let images = baked.images(&world, options.encoding);
+        let [(path, page)] = &images[..] else {
+            panic!("{} images", images.len())
+        };
+        assert_eq!((path.as_str(), page.side), (IMAGE, 16));
+        assert!(page.texels.iter().all(|texel| texel.x > 12.0 / 255.0));
+        // six walls with the density that they have on the image
+        let material = |_: &str| LightmapUse {
+            image: Some(16),
+            shows_page: false,
+            ..LightmapUse::default()
+        };
+        let laid = make(&mut bsp, &LayoutOptions::external(&material)).unwrap();
+        assert_eq!(laid.charts, 6);
+        assert!(bsp.surfaces.iter().all(|s| s.lightmap >= 0));
+    }
 }

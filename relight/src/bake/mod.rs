@@ -16,6 +16,7 @@
 //! * [`store`]: pages written into a map, beside it, and into packs.
 
 mod coverage;
+mod dirt;
 mod encode;
 mod gather;
 mod grid;
@@ -38,12 +39,13 @@ pub use page::{Page, light_bytes};
 pub use rays::Rays;
 
 use crate::calibrate::Dirt;
+use crate::overbright::luminance;
 use crate::world::{RelitWorld, WorldMaterial};
 use glam::Vec3;
 use q3bsp::GridPoint;
 use std::ops::Range;
 use support::parallel;
-use support::slice::{item, part};
+use support::slice::{item, part, part_mut};
 use targets::Targets;
 
 /// Texels around a covered one that filtering may read.
@@ -58,6 +60,12 @@ pub enum Reflectance {
     /// 0.55 of the mean of their display-encoded image, as q3map2 has it.
     Compiler,
 }
+
+/// Least weight of the normal in the direction to the light: a step of a stored byte, as q3map2 has it.
+const LEAST_TOWARDS: f32 = 4.0 / 256.0;
+
+/// Weight of bounced light in the direction to the light: q3map2's, since bounces would turn it to the normal.
+const BOUNCE_TOWARDS: f32 = 0.25;
 
 /// Part of display-encoded texture colour that q3map2's bounces reflect: 500 × 0.375 × 3 × 0.25 / 255.
 const COMPILER_REFLECTANCE: f32 = 0.5515;
@@ -136,6 +144,8 @@ pub struct BakedPage {
     pub owners: Vec<u32>,
     /// Light of each texel.
     pub light: Vec<Light>,
+    /// Unit normal of the surface at each texel that has an owner.
+    pub normals: Vec<Vec3>,
 }
 
 /// Light of a map.
@@ -166,17 +176,47 @@ pub fn bake(
     let direct = gather.direct(&targets.points, options.samples, &mut |part| {
         progress(BakeStage::Direct, part);
     })?;
-    let mut places = Places::of(&targets, |points| mean(part(&direct, points)));
-    let of_places = (&targets, firsts.as_slice());
-    bounce(world, of_places, &mut places, gather, options, progress)?;
-    places
-        .lights_mut()
-        .for_each(|light| light.value += world.ambient);
-    if let Some(dirt) = options.dirt {
-        let near = gather.nearness(&firsts, &dirt.surroundings(), &mut |part| {
-            progress(BakeStage::Dirt, part);
-        })?;
-        places.darken(&targets, near.iter().map(|near| dirt.part_stored(*near)));
+    let least = LEAST_TOWARDS.max(luminance(world.ambient));
+    let mut places = Places::of(&targets, |points| {
+        let mut light = mean(part(&direct, points.clone()));
+        let normal = part(&targets.points, points)
+            .first()
+            .map_or(Vec3::ZERO, |point| point.normal);
+        light.towards += normal * least;
+        light
+    });
+    let dirt = match options.dirt {
+        Some(dirt) => {
+            let near = gather.nearness(&firsts, &dirt.surroundings(), &mut |part| {
+                progress(BakeStage::Dirt, part);
+            })?;
+            let parts = near.iter().map(|near| dirt.part(*near));
+            Some(dirt::of_places(world, &targets, parts))
+        }
+        None => None,
+    };
+    // q3map2 darkens direct light and each bounce; calibration has fitted a darkened sum
+    let each = dirt.as_deref().filter(|_| world.has_compiled_lights);
+    if let Some(dirt) = each {
+        places.darken(dirt);
+    }
+    let ambient = |index: usize| {
+        world.ambient * each.map_or(1.0, |dirt| dirt.get(index).copied().unwrap_or(1.0))
+    };
+    bounce(
+        world,
+        (&targets, &firsts),
+        &mut places,
+        (&ambient, each),
+        gather,
+        options,
+        progress,
+    )?;
+    for (index, light) in places.lights_mut().enumerate() {
+        light.value += ambient(index);
+    }
+    if let Some(dirt) = dirt.as_deref().filter(|_| each.is_none()) {
+        places.darken(dirt);
     }
     let grid = match options.grid {
         true => grid::bake(
@@ -201,11 +241,13 @@ fn mean(points: &[Light]) -> Light {
     sum * (1.0 / points.len().max(1) as f32)
 }
 
-/// Adds the bounces to the light of all places. `firsts`: [`Places::first_points`].
+/// Adds the bounces to the light of all places. `firsts`: [`Places::first_points`]; `ambient`: ambient light of each place;
+/// `dirt`: part of the light that each keeps.
 fn bounce(
     world: &RelitWorld,
     (targets, firsts): (&Targets, &[Point]),
     places: &mut Places,
+    (ambient, dirt): (&dyn Fn(usize) -> Vec3, Option<&[f32]>),
     gather: &mut dyn Gather,
     options: &BakeOptions,
     progress: BakeProgress<'_>,
@@ -217,8 +259,9 @@ fn bounce(
     let mut last = places.clone();
     if world.has_compiled_lights {
         // q3map2 reflects the ambient term once
-        last.lights_mut()
-            .for_each(|light| light.value += world.ambient);
+        for (index, light) in last.lights_mut().enumerate() {
+            light.value += ambient(index);
+        }
     }
     for number in 1..=options.bounces {
         last.fill(targets);
@@ -237,8 +280,12 @@ fn bounce(
             false => found.next().unwrap_or_default(),
         });
         last.smooth(world, targets);
+        if let Some(dirt) = dirt {
+            last.darken(dirt);
+        }
         for (sum, more) in places.lights_mut().zip(last.lights_mut()) {
-            *sum += *more;
+            sum.value += more.value;
+            sum.towards += more.towards * BOUNCE_TOWARDS;
         }
     }
     Ok(())
@@ -259,7 +306,7 @@ fn reflectances(world: &RelitWorld, kind: Reflectance) -> Vec<Vec3> {
     let mut all = vec![Vec3::ZERO; world.indices.len() / 3];
     for surface in &world.surfaces {
         let value = item(&of_materials, surface.material as usize);
-        support::slice::part_mut(&mut all, surface.triangles()).fill(value);
+        part_mut(&mut all, surface.triangles()).fill(value);
     }
     all
 }
@@ -355,6 +402,27 @@ impl Places {
             .collect()
     }
 
+    /// Normals of all texels that have points, and of those around them.
+    fn normals(&self, targets: &Targets) -> Vec<Vec3> {
+        let mut all = vec![Vec3::ZERO; targets.texels];
+        for page in &targets.pages {
+            let range = page.first..page.first + page.side * page.side;
+            let normals = part_mut(&mut all, range.clone());
+            for texel in &page.texels {
+                let point = targets.points.get(texel.points.start as usize);
+                if let (Some(slot), Some(point)) = (normals.get_mut(texel.at as usize), point)
+                    && !texel.points.is_empty()
+                {
+                    *slot = point.normal;
+                }
+            }
+            let mut owners = part(&self.owners, range).to_vec();
+            let mean = |near: &[Vec3]| near.iter().sum::<Vec3>().normalize_or_zero();
+            coverage::fill(page.side, RINGS, &mut owners, normals, mean);
+        }
+        all
+    }
+
     /// Gives texels around the covered ones light.
     fn fill(&mut self, targets: &Targets) {
         let mut pages = of_pages(targets, &mut self.owners, &mut self.all);
@@ -371,17 +439,10 @@ impl Places {
         });
     }
 
-    /// Multiplies the light of each place by the factor of its first point, in the order of [`Places::first_points`].
-    fn darken(&mut self, targets: &Targets, mut factors: impl Iterator<Item = f32>) {
-        let mut of_places = Places::of(targets, |points| match points.is_empty() {
-            true => Light::default(),
-            false => Light {
-                value: Vec3::splat(factors.next().unwrap_or(1.0)),
-                towards: Vec3::ZERO,
-            },
-        });
-        for (light, factor) in self.lights_mut().zip(of_places.lights_mut()) {
-            *light = *light * factor.value.x;
+    /// Multiplies the light of each place by its factor.
+    fn darken(&mut self, factors: &[f32]) {
+        for (light, factor) in self.lights_mut().zip(factors) {
+            light.value *= *factor;
         }
     }
 
@@ -402,6 +463,7 @@ impl Places {
             .iter()
             .filter(|v| v.points.is_empty())
             .count();
+        let mut normals = self.normals(targets);
         self.fill(targets);
         let [texel, vertex, _] = options.least;
         let pages = targets.pages.iter().map(|page| {
@@ -413,8 +475,9 @@ impl Places {
             BakedPage {
                 number: page.number,
                 side: page.side,
-                owners: part(&self.owners, range).to_vec(),
+                owners: part(&self.owners, range.clone()).to_vec(),
                 light,
+                normals: part_mut(&mut normals, range).to_vec(),
             }
         });
         let vertices = targets.vertices.iter().zip(&self.vertices);

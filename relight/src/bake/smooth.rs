@@ -43,6 +43,32 @@ pub(super) fn smooth(world: &RelitWorld, side: usize, owners: &[u32], light: &mu
     }
 }
 
+/// Gives each texel of a page that has an owner the mean over 3 × 3 texels of its plane.
+pub(super) fn box_filter(world: &RelitWorld, side: usize, owners: &[u32], values: &mut [f32]) {
+    let before = values.to_vec();
+    for (texel, slot) in values.iter_mut().enumerate() {
+        let owner = item_or_none(owners, texel);
+        if owner == u32::MAX {
+            continue;
+        }
+        let (x, y) = (texel % side, texel / side);
+        let (mut sum, mut count) = (0.0, 0.0f32);
+        for row in y.saturating_sub(1)..=(y + 1).min(side - 1) {
+            for column in x.saturating_sub(1)..=(x + 1).min(side - 1) {
+                let other = row * side + column;
+                let other_owner = item_or_none(owners, other);
+                if other_owner != u32::MAX && alike(world, owner, other_owner) {
+                    sum += item(&before, other);
+                    count += 1.0;
+                }
+            }
+        }
+        if count > 0.0 {
+            *slot = sum / count;
+        }
+    }
+}
+
 fn item_or_none(owners: &[u32], at: usize) -> u32 {
     owners.get(at).copied().unwrap_or(u32::MAX)
 }

@@ -16,11 +16,11 @@ const LEAST_PART: f32 = 0.1;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dirt {
     /// Distance within which surfaces occlude, id units.
-    pub(super) depth: f32,
+    pub depth: f32,
     /// Exponent of the occlusion.
-    pub(super) gain: f32,
+    pub gain: f32,
     /// Factor of the occlusion.
-    pub(super) scale: f32,
+    pub scale: f32,
 }
 
 impl Dirt {
@@ -47,10 +47,16 @@ impl Dirt {
         }
     }
 
-    /// Part of the light that was stored where surfaces are so near ([`Surroundings`]), 0.1 to 1.
+    /// Part of the light that was stored where surfaces are so near ([`Surroundings`]), at least 0.1, so that light can
+    /// be divided by it.
     pub(crate) fn part_stored(&self, nearness: f32) -> f32 {
+        self.part(nearness).max(LEAST_PART)
+    }
+
+    /// Part of the light that is stored where surfaces are so near, 0 to 1.
+    pub(crate) fn part(&self, nearness: f32) -> f32 {
         let taken = nearness.powf(self.gain).min(1.0) * self.scale;
-        (1.0 - taken).clamp(LEAST_PART, 1.0)
+        (1.0 - taken).clamp(0.0, 1.0)
     }
 }
 

@@ -51,6 +51,8 @@ pub struct RelitWorld {
     /// Pages of baked light that scripts name, beside those in the map: as they are shown, without overbright bits. Page
     /// numbers count on from the map's own.
     pub pages: Vec<Lightmap>,
+    /// Game path of the file of each of `pages`.
+    pub files_of_pages: Vec<String>,
     /// Coronas.
     pub flares: Vec<Flare>,
     /// Files of materials, if they were read.

@@ -38,6 +38,8 @@ pub(crate) struct PageLoader<'a> {
     files: &'a dyn GameFiles,
     known: HashMap<String, Option<u32>>,
     pub pages: Vec<Lightmap>,
+    /// Game path of the file of each.
+    pub files_of_pages: Vec<String>,
     /// What could not be read.
     pub warnings: Vec<String>,
 }
@@ -48,6 +50,7 @@ impl<'a> PageLoader<'a> {
             files,
             known: HashMap::new(),
             pages: Vec::new(),
+            files_of_pages: Vec::new(),
             warnings: Vec::new(),
         }
     }
@@ -85,8 +88,9 @@ impl<'a> PageLoader<'a> {
             return page;
         }
         let page = match image::load(self.files, name) {
-            Ok(found) => found.map(|(image, _)| {
+            Ok(found) => found.map(|(image, path)| {
                 self.pages.push(square(&image));
+                self.files_of_pages.push(path);
                 self.pages.len() as u32 - 1
             }),
             Err(problem) => {
@@ -149,6 +153,8 @@ mod tests {
             eval::apply_tc_mods(&own.tc_mods, Vec2::ZERO, glam::Vec3::ZERO, 0.0, Vec2::ZERO);
         assert_eq!(moved, Vec2::new(0.5, 0.0));
         // blue, green, red in the file; one row becomes two
+        assert_eq!(loader.files_of_pages.len(), loader.pages.len());
+        assert_eq!(loader.files_of_pages[0], "maps/m/LM_0000.tga");
         assert_eq!(loader.pages[0].0[..], [3, 2, 1, 6, 5, 4, 3, 2, 1, 6, 5, 4]);
     }
 }

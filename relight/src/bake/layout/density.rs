@@ -11,9 +11,9 @@ const LEAST_AREA: f32 = 1e-2;
 const WHOLE: f32 = 0.03;
 
 /// Distance between the texels of a surface's present chart, id units along the axes of its projection; `None` without one,
-/// and for a chart that is a single texel.
-pub(super) fn present(bsp: &Bsp, surface: &Surface, shape: &Shape) -> Option<f32> {
-    let side = bsp.lightmap_size() as f32;
+/// and for a chart that is a single texel. `side`: texels per side of its page.
+pub(super) fn present(bsp: &Bsp, surface: &Surface, shape: &Shape, side: u32) -> Option<f32> {
+    let side = side as f32;
     let vertices = bsp.surface_vertices(surface);
     let (mut world, mut texels) = (0.0, 0.0);
     for corners in corners(bsp, surface) {
@@ -131,12 +131,15 @@ mod tests {
         }
         let bsp = map.build();
         let surface = &bsp.surfaces[at];
-        assert_eq!(present(&bsp, surface, &shape(&bsp, surface)), Some(16.0));
+        assert_eq!(
+            present(&bsp, surface, &shape(&bsp, surface), 128),
+            Some(16.0)
+        );
         let mut point = bsp.clone();
         point
             .vertices
             .iter_mut()
             .for_each(|v| v.lightmap = Vec2::ZERO);
-        assert_eq!(present(&point, surface, &shape(&bsp, surface)), None);
+        assert_eq!(present(&point, surface, &shape(&bsp, surface), 128), None);
     }
 }

@@ -11,6 +11,9 @@ pub struct LightmapUse {
     pub shows_page: bool,
     /// Whether it shows light of further styles, at places of the present pages that its script names.
     pub styled: bool,
+    /// Texels per side of the image that it shows in place of a page of the map; `None` without one. Surfaces with it get
+    /// charts, too.
+    pub image: Option<u32>,
     /// `q3map_lightmapSampleSize`: distance between texels, id units.
     pub sample_size: Option<f32>,
 }
@@ -21,6 +24,7 @@ impl Default for LightmapUse {
         LightmapUse {
             shows_page: true,
             styled: false,
+            image: None,
             sample_size: None,
         }
     }
@@ -53,6 +57,7 @@ impl LightmapUse {
             shows_page: (shows_page || script.rejected.is_some())
                 && !script.surface_params.iter().any(vertex_lit),
             styled,
+            image: None,
             sample_size: size.filter(|size| *size > 0.0),
         }
     }

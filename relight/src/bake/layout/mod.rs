@@ -316,22 +316,26 @@ fn wanted(bsp: &Bsp, options: &LayoutOptions<'_>) -> Vec<Wanted> {
             .get(surface.shader.index())
             .copied()
             .unwrap_or_default();
+        let by_vertex = surface.lightmap == lightmap_index::BY_VERTEX;
+        let image = material.image.filter(|_| by_vertex);
         let page = match lit {
             true => surface.lightmap >= 0,
-            false => surface.lightmap == lightmap_index::BY_VERTEX,
+            false => by_vertex,
         };
         let drawn = match surface.kind {
             SurfaceKind::Planar => surface.num_indices > 0,
             SurfaceKind::Patch => true,
             _ => false,
         };
-        if !drawn || !page || flags & WITHOUT_LIGHTMAP != 0 || !material.shows_page {
+        let shown = (page && material.shows_page) || image.is_some();
+        if !drawn || !shown || flags & WITHOUT_LIGHTMAP != 0 {
             continue;
         }
         let shape = shape(bsp, surface);
-        let present = match lit {
-            true => density::present(bsp, surface, &shape),
-            false => {
+        let own_side = lit.then(|| bsp.lightmap_size() as u32);
+        let present = match image.or(own_side) {
+            Some(side) => density::present(bsp, surface, &shape, side),
+            None => {
                 let of_model = models.get(model as usize);
                 of_model.map(|m| m.sample(material.sample_size, options.sample_size))
             }

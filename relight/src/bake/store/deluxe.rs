@@ -7,6 +7,7 @@
 use super::super::page::Page;
 use glam::Vec3;
 use q3bsp::{Bsp, entities};
+use std::collections::BTreeSet;
 
 /// The axes that directions are stored along.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -49,6 +50,52 @@ fn to_surface(direction: Vec3, normal: Vec3) -> Vec3 {
         direction.dot(binormal),
         direction.dot(n),
     )
+}
+
+/// Smallest part of the texels of a page of directions that have the length of a direction.
+const LIKELY: f32 = 0.9;
+
+/// The axes of a map's deluxe maps, `None` if it has none: what the key `deluxeMaps` states, else model space where
+/// surfaces have even pages alone and the pages after them hold unit vectors, as DarkPlaces and q3map2 have it.
+pub fn space_of(bsp: &Bsp) -> Option<DirectionSpace> {
+    let lit = bsp.surfaces.iter().filter(|s| s.lightmap >= 0);
+    let used: BTreeSet<usize> = lit
+        .filter_map(|s| usize::try_from(s.lightmap).ok())
+        .collect();
+    let pages = &bsp.lightmaps;
+    let between = |page: &usize| page.is_multiple_of(2) && page + 1 < pages.len();
+    if used.is_empty() || !used.iter().all(between) {
+        return None;
+    }
+    let list = bsp.entities();
+    match list.first().and_then(|world| world.last("deluxeMaps")) {
+        Some("1") => return Some(DirectionSpace::Model),
+        Some("2") => return Some(DirectionSpace::Surface),
+        _ => {}
+    }
+    let texels = used.iter().filter_map(|page| pages.get(page + 1));
+    let texels = texels.flat_map(|page| page.0.as_chunks::<3>().0);
+    let (mut written, mut unit) = (0usize, 0usize);
+    for texel in texels.filter(|texel| **texel != [0; 3]) {
+        written += 1;
+        unit += usize::from((direction(*texel).length() - 1.0).abs() < 0.1);
+    }
+    (written > 0 && unit as f32 >= LIKELY * written as f32).then_some(DirectionSpace::Model)
+}
+
+/// The direction that a texel of a page of directions holds.
+pub fn direction(texel: [u8; 3]) -> Vec3 {
+    Vec3::from_array(texel.map(f32::from)) / 127.5 - 1.0
+}
+
+/// Puts pages of directions at the places that a map with deluxe maps has for them: after the pages of light.
+pub fn replace(pages: &mut [Page], directions: Vec<Page>) {
+    let light = directions.into_iter().enumerate().step_by(2);
+    for (number, page) in light {
+        if let Some(slot) = pages.get_mut(number + 1) {
+            *slot = page;
+        }
+    }
 }
 
 /// Puts pages of directions between those of light, and gives surfaces and the world's entity the numbers and keys of that.
@@ -123,7 +170,38 @@ mod tests {
             );
         }
         assert_eq!(bsp.entities()[0].get("deluxeMaps"), Some("1"));
+        assert_eq!(space_of(&bsp), None, "without pages");
         super::super::internal(&mut bsp, &all).unwrap();
-        Bsp::parse(&bsp.write()).unwrap();
+        let read = Bsp::parse(&bsp.write()).unwrap();
+        assert_eq!(space_of(&read), Some(DirectionSpace::Model));
+    }
+
+    #[test]
+    fn pages_of_directions_are_recognized_without_a_key() {
+        let mut bsp = room();
+        let pages = bsp.lightmaps.len();
+        let of = |texel: Vec3| Page {
+            side: 128,
+            texels: vec![texel; 128 * 128],
+        };
+        let up = direction_texel(Vec3::Z, Vec3::Z, DirectionSpace::Model);
+        let (light, directions) = (vec![of(Vec3::ONE); pages], vec![of(up); pages]);
+        let all = interleave(&mut bsp, light, directions, DirectionSpace::Surface);
+        super::super::internal(&mut bsp, &all).unwrap();
+        assert_eq!(space_of(&bsp), Some(DirectionSpace::Surface));
+        let mut list = bsp.entities();
+        list[0].pairs.retain(|(key, _)| !key.starts_with("deluxe"));
+        bsp.entities = entities::write(&list);
+        assert_eq!(space_of(&bsp), Some(DirectionSpace::Model));
+        assert!(direction(bsp.lightmaps[1].texel(0, 0)).dot(Vec3::Z) > 0.99);
+        // a second page of light is none of directions
+        bsp.lightmaps[1] = bsp.lightmaps[0].clone();
+        if pages == 1 {
+            assert_eq!(space_of(&bsp), None);
+        }
+        let mut stored = vec![of(Vec3::ONE); all.len()];
+        replace(&mut stored, vec![of(up); all.len()]);
+        assert_eq!(stored[0].texel(0, 0), Vec3::ONE);
+        assert_eq!(stored[1].texel(0, 0), up);
     }
 }

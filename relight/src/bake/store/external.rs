@@ -11,9 +11,13 @@ use crate::bake::page::Page;
 use crate::files::GameFiles;
 use crate::materials::Materials;
 use crate::overbright::MAP_OVERBRIGHT_BITS;
+use image::ImageEncoder;
 use q3bsp::{Bsp, ShaderId, ShaderRef, SurfaceKind, lightmap_index};
 use std::collections::{BTreeMap, BTreeSet};
 use support::hash::Hash;
+
+/// Quality of JPEG images, of 100.
+const JPEG: u8 = 95;
 
 /// Longest game path, bytes.
 const LONGEST: usize = 63;
@@ -46,7 +50,7 @@ pub fn numbered(bsp: &mut Bsp, map: &str, pages: &[Page]) -> Result<Vec<GameFile
 
 /// Pages as images that scripts name. Surfaces get materials of their own, one for each material and page, in the script
 /// `scripts/relit_NAME.shader`. The images have the light as it is displayed, after the shift of the overbright bits, since
-/// engines shift only pages in maps.
+/// engines shift only pages in maps. `taken`: paths of images that other surfaces show.
 ///
 /// # Errors
 /// [`StoreError`]; the map is as it was.
@@ -54,21 +58,22 @@ pub fn scripted(
     bsp: &mut Bsp,
     map: &str,
     pages: &[Page],
-    files: &dyn GameFiles,
-    materials: &Materials,
+    (files, materials): (&dyn GameFiles, &Materials),
+    taken: &BTreeSet<String>,
 ) -> Result<Vec<GameFile>, StoreError> {
     check(bsp, pages)?;
     let mut out = Vec::with_capacity(pages.len() + 1);
-    for (number, page) in pages.iter().enumerate() {
-        let shown = Page {
-            side: page.side,
-            texels: (page.texels.iter())
-                .map(|texel| *texel * (1 << MAP_OVERBRIGHT_BITS) as f32)
-                .collect(),
-        };
+    let mut number = 0;
+    for page in pages {
+        let mut place = path(map, number)?;
+        while taken.contains(&place.to_ascii_lowercase()) {
+            number += 1;
+            place = path(map, number)?;
+        }
+        number += 1;
         out.push(GameFile {
-            path: path(map, number)?,
-            bytes: encode(&lightmap(&shown)),
+            path: place,
+            bytes: encode(&lightmap(&as_shown(page))),
         });
     }
     let name = map_name(map);
@@ -88,8 +93,11 @@ pub fn scripted(
                 let Some(old) = bsp.shaders.get(surface.shader.index()).cloned() else {
                     continue;
                 };
-                let image = path(map, usize::try_from(page).unwrap_or(0))?;
-                let body = with_image(files, materials, &old.name, &image);
+                let image = usize::try_from(page).ok().and_then(|page| out.get(page));
+                let Some(image) = image.map(|file| file.path.as_str()) else {
+                    continue;
+                };
+                let body = with_image(files, materials, &old.name, image);
                 let new = script_name(name, &old.name, &body);
                 if known.insert(new.clone()) {
                     text += &format!("\n// {}\n{new}\n{body}", old.name);
@@ -110,6 +118,39 @@ pub fn scripted(
         bytes: text.into_bytes(),
     });
     Ok(out)
+}
+
+/// A page as engines show it, which shift only pages in maps.
+fn as_shown(page: &Page) -> Page {
+    let scale = (1 << MAP_OVERBRIGHT_BITS) as f32;
+    Page {
+        side: page.side,
+        texels: page.texels.iter().map(|texel| *texel * scale).collect(),
+    }
+}
+
+/// Pages as images at given game paths. Engines look for the name's extension first, then for others: the image has the
+/// extension that is given, `.tga`, `.png` or `.jpg`. `None` for any other.
+pub fn image_file(path: &str, page: &Page) -> Option<GameFile> {
+    let page = lightmap(page);
+    let side = u32::try_from(page.size()).ok()?;
+    let (_, extension) = path.rsplit_once('.')?;
+    let mut bytes = Vec::new();
+    let rgb = image::ExtendedColorType::Rgb8;
+    match extension.to_ascii_lowercase().as_str() {
+        "tga" => bytes = encode(&page),
+        "png" => image::codecs::png::PngEncoder::new(&mut bytes)
+            .write_image(&page.0, side, side, rgb)
+            .ok()?,
+        "jpg" | "jpeg" => image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, JPEG)
+            .write_image(&page.0, side, side, rgb)
+            .ok()?,
+        _ => return None,
+    }
+    Some(GameFile {
+        path: path.to_owned(),
+        bytes,
+    })
 }
 
 /// The name of a material with another image: the map's, and a hash of the old name and the definition.
@@ -176,7 +217,10 @@ mod tests {
         let before: Vec<i32> = bsp.surfaces.iter().map(|s| s.lightmap).collect();
         let none = MemoryFiles::new();
         let (materials, _) = Materials::load(&none);
-        let written = scripted(&mut bsp, "maps/room.bsp", &pages, &none, &materials).unwrap();
+        let taken = BTreeSet::from(["maps/room/lm_0000.tga".to_owned()]);
+        let game: (&dyn GameFiles, &Materials) = (&none, &materials);
+        let written = scripted(&mut bsp, "maps/room.bsp", &pages, game, &taken).unwrap();
+        assert_eq!(written[0].path, "maps/room/lm_0001.tga");
         let mut files = folder(written);
         let wall = encode(&Lightmap(vec![200; 12].into()));
         files.insert("textures/wall.tga", wall).unwrap();
@@ -193,6 +237,24 @@ mod tests {
             let value = (4.0 * (0.1 + 0.1 * page as f32) * 255.0).min(255.0).round() as u8;
             assert_eq!(found.texel(0, 0), [value; 3]);
         }
+    }
+
+    #[test]
+    fn images_keep_the_extension_that_scripts_name() {
+        let page = Page {
+            side: 2,
+            texels: vec![Vec3::splat(0.5); 4],
+        };
+        for (path, within) in [("maps/m/a.tga", 0), ("b.png", 0), ("c.JPG", 2)] {
+            let file = image_file(path, &page).unwrap();
+            let extension = path.rsplit_once('.').unwrap().1.to_ascii_lowercase();
+            let read = crate::image::decode("lm", &extension, &file.bytes).unwrap();
+            assert!(
+                read.pixels().all(|p| p[0].abs_diff(128) <= within),
+                "{path}"
+            );
+        }
+        assert!(image_file("a.dds", &page).is_none());
     }
 
     #[test]

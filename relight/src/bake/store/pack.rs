@@ -6,20 +6,14 @@ use std::collections::BTreeMap;
 use std::io::{Cursor, Write};
 use zip::write::SimpleFileOptions;
 
-/// A pack.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// A pack of relit maps.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct RelitPack {
-    /// File name: engines read packs in the order of their names, and later ones count.
-    pub name: String,
-    /// The archive. Equal files give equal bytes.
-    pub bytes: Vec<u8>,
-    /// Game paths of its files.
-    pub files: Vec<String>,
-    /// What people who use it need to know.
-    pub notes: Vec<String>,
+    files: BTreeMap<String, Vec<u8>>,
+    notes: Vec<String>,
 }
 
-/// A relit map as a pack.
+/// A relit map for a pack.
 #[derive(Debug, Clone, Copy)]
 pub struct RelitMap<'a> {
     /// Game path of the map.
@@ -34,43 +28,55 @@ pub struct RelitMap<'a> {
     pub files: &'a [GameFile],
 }
 
-/// Writes the pack of a relit map: the map, what its light needs, and its file for bots with the checksum of the new map.
-///
-/// # Errors
-/// The archive cannot be written: a file is larger than an archive holds.
-pub fn relit_pack(map: RelitMap<'_>) -> Result<RelitPack, String> {
-    let name = map_name(map.map);
-    let mut files: BTreeMap<String, &[u8]> = BTreeMap::new();
-    let mut notes = vec![
-        "a server with sv_pure 1 accepts a player's pack only if it has the same one".to_owned(),
-    ];
-    let bots = map.aas.map(|aas| aas::adapt(aas, map.original, map.relit));
-    match &bots {
-        Some(Ok(adapted)) => {
-            files.insert(format!("maps/{name}.aas"), adapted);
+/// File name of the pack of a map: engines read packs in the order of their names, and later ones count.
+pub fn pack_name(map: &str) -> String {
+    format!("z_{}_relit.pk3", map_name(map))
+}
+
+impl RelitPack {
+    /// Adds a relit map, what its light needs, and its file for bots with the checksum of the new map.
+    pub fn add(&mut self, map: RelitMap<'_>) {
+        let name = map_name(map.map);
+        match map.aas.map(|aas| aas::adapt(aas, map.original, map.relit)) {
+            Some(Ok(adapted)) => {
+                self.files.insert(format!("maps/{name}.aas"), adapted);
+            }
+            Some(Err(problem @ (AasError::Format | AasError::OtherMap))) => {
+                self.notes.push(format!(
+                    "bots do not work on the relit map: {name}.aas: {problem}"
+                ));
+            }
+            None => {}
         }
-        Some(Err(problem @ (AasError::Format | AasError::OtherMap))) => {
-            notes.push(format!(
-                "bots do not work on the relit map: {name}.aas: {problem}"
-            ));
+        let relit = map.relit.to_owned();
+        self.files.insert(format!("maps/{name}.bsp"), relit);
+        for file in map.files {
+            self.files.insert(file.path.clone(), file.bytes.clone());
         }
-        None => {}
     }
-    files.insert(format!("maps/{name}.bsp"), map.relit);
-    for file in map.files {
-        files.insert(file.path.clone(), &file.bytes);
+
+    /// Game paths of its files.
+    pub fn files(&self) -> impl Iterator<Item = &str> {
+        self.files.keys().map(String::as_str)
     }
-    let bytes = archive(&files).map_err(|problem| problem.to_string())?;
-    Ok(RelitPack {
-        name: format!("z_{name}_relit.pk3"),
-        bytes,
-        files: files.into_keys().collect(),
-        notes,
-    })
+
+    /// What people who use it need to know.
+    pub fn notes(&self) -> impl Iterator<Item = &str> {
+        let pure = "a server with sv_pure 1 accepts a player's pack only if it has the same one";
+        self.notes.iter().map(String::as_str).chain([pure])
+    }
+
+    /// The archive. Equal files give equal bytes.
+    ///
+    /// # Errors
+    /// It cannot be written: a file is larger than an archive holds.
+    pub fn archive(&self) -> Result<Vec<u8>, String> {
+        archive(&self.files).map_err(|problem| problem.to_string())
+    }
 }
 
 /// A zip archive in the order of the names, without times.
-fn archive(files: &BTreeMap<String, &[u8]>) -> zip::result::ZipResult<Vec<u8>> {
+fn archive(files: &BTreeMap<String, Vec<u8>>) -> zip::result::ZipResult<Vec<u8>> {
     let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
     for (path, bytes) in files {
         let options = SimpleFileOptions::default().last_modified_time(zip::DateTime::default());
@@ -98,16 +104,26 @@ mod tests {
             aas: Some(b"no such file"),
             files: &[image],
         };
-        let pack = relit_pack(map).unwrap();
-        assert_eq!(pack, relit_pack(map).unwrap());
-        assert_eq!(pack.name, "z_m_relit.pk3");
-        assert_eq!(pack.files, ["maps/m.bsp", "maps/m/lm_0000.tga"]);
-        assert_eq!(pack.notes.len(), 2, "{:?}", pack.notes);
+        let mut pack = RelitPack::default();
+        pack.add(map);
+        let other = RelitMap {
+            map: "maps/n.bsp",
+            aas: None,
+            files: &[],
+            ..map
+        };
+        pack.add(other);
+        let bytes = pack.archive().unwrap();
+        assert_eq!(bytes, pack.archive().unwrap());
+        assert_eq!(pack_name("maps/m.bsp"), "z_m_relit.pk3");
+        let names: Vec<&str> = pack.files().collect();
+        assert_eq!(names, ["maps/m.bsp", "maps/m/lm_0000.tga", "maps/n.bsp"]);
+        assert_eq!(pack.notes().count(), 2);
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(&pack.name);
-        std::fs::write(&path, &pack.bytes).unwrap();
+        let path = folder.path().join("z.pk3");
+        std::fs::write(&path, &bytes).unwrap();
         let opened = Pk3::open(&path).unwrap();
         assert_eq!(opened.read("maps/m.bsp").unwrap().unwrap(), b"new");
-        assert_eq!(opened.all_names().count(), 2);
+        assert_eq!(opened.all_names().count(), 3);
     }
 }

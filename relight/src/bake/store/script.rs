@@ -3,8 +3,8 @@
 use crate::files::GameFiles;
 use crate::materials::Materials;
 use crate::materials::light::{BakedLight, baked_light};
-use shaderscript::Shader;
 use shaderscript::token::{Lexer, Reading, Token};
+use shaderscript::{Shader, Stage};
 
 /// The definition of a material without its name, with an image in place of `$lightmap`; of a material without script, what
 /// the engine makes of its image.
@@ -21,7 +21,11 @@ pub(super) fn with_image(
 ) -> String {
     let written = definition(files, materials, name).map(|(shader, tokens)| {
         let light = baked_light(&shader.stages);
-        replaced(&tokens, &light, image)
+        let own = |(stage, light): (&Stage, &Option<BakedLight>)| {
+            *light == Some(BakedLight::Main) && stage.tc_mods.is_empty()
+        };
+        let images: Vec<bool> = shader.stages.iter().zip(&light).map(own).collect();
+        replaced(&tokens, &light, &images, image)
     });
     written.unwrap_or_else(|| {
         let name = shaderscript::strip_extension(name);
@@ -70,8 +74,9 @@ fn definition<'a>(
 type Line = (usize, Vec<String>);
 
 /// The definition as text with the image in its stages of the lightmap, and without those of styles, which show places of
-/// the former pages. `light`: baked light of each stage.
-fn replaced(tokens: &[Token], light: &[Option<BakedLight>], image: &str) -> String {
+/// the former pages. `light`: baked light of each stage; `mains`: whether its image, if it names one, is a page of the main
+/// light.
+fn replaced(tokens: &[Token], light: &[Option<BakedLight>], mains: &[bool], image: &str) -> String {
     let mut body = Vec::new();
     let mut stages: Vec<Vec<Line>> = Vec::new();
     let mut depth = 0usize;
@@ -107,7 +112,9 @@ fn replaced(tokens: &[Token], light: &[Option<BakedLight>], image: &str) -> Stri
         .collect();
     let mut kept = keep.iter();
     stages.retain(|_| kept.next() == Some(&true));
-    let at = show_image(&mut stages, image);
+    let mains = mains.iter().zip(&keep).filter(|(_, keep)| **keep);
+    let mains: Vec<bool> = mains.map(|(main, _)| *main).collect();
+    let at = show_image(&mut stages, &mains, image);
     let directive = match at.is_some_and(|at| at + 1 == stages.len()) {
         true => "\tnomipmaps\n",
         false => "\tnopicmip\n",
@@ -141,12 +148,12 @@ fn is(word: &str, name: &str) -> bool {
     word.eq_ignore_ascii_case(name)
 }
 
-/// Whether a line of a stage names the page.
-fn is_page(line: &[String]) -> bool {
+/// Whether a line of a stage names the page. `main`: whether an image in its place is one.
+fn is_page(line: &[String], main: bool) -> bool {
     match line {
         [keyword, page, ..] => {
             (is(keyword, "map") || is(keyword, "clampMap"))
-                && (is(page, "$lightmap") || is(page, "*lightmap"))
+                && (main || is(page, "$lightmap") || is(page, "*lightmap"))
         }
         _ => false,
     }
@@ -157,9 +164,10 @@ fn is_page(line: &[String]) -> bool {
 /// Engines draw the first two stages at once, with the colour of the first, if one multiplies the other and both have the
 /// same `rgbGen` and nothing else in particular (`CollapseMultitexture`). That stays: where both are `identity`, both become
 /// `identityLighting`. Two passes would darken triangles that compilers left double.
-fn show_image(stages: &mut [Vec<Line>], image: &str) -> Option<usize> {
-    let shows: Vec<bool> = (stages.iter())
-        .map(|stage| stage.iter().any(|(_, line)| is_page(line)))
+fn show_image(stages: &mut [Vec<Line>], mains: &[bool], image: &str) -> Option<usize> {
+    let main = |number: usize| mains.get(number) == Some(&true);
+    let shows: Vec<bool> = (stages.iter().enumerate())
+        .map(|(number, stage)| stage.iter().any(|(_, line)| is_page(line, main(number))))
         .collect();
     let together = match stages {
         [first, second, ..] => {
@@ -174,9 +182,10 @@ fn show_image(stages: &mut [Vec<Line>], image: &str) -> Option<usize> {
         if !changes {
             continue;
         }
-        let mut generated = false;
+        let (mut generated, mut placed) = (false, false);
         for (_, line) in stage.iter_mut() {
-            if is_page(line) {
+            placed |= line.first().is_some_and(|word| is(word, "tcGen"));
+            if is_page(line, shows && main(number)) {
                 *line = vec!["map".to_owned(), image.to_owned()];
             }
             if let [keyword, kind, ..] = &mut line[..]
@@ -189,7 +198,7 @@ fn show_image(stages: &mut [Vec<Line>], image: &str) -> Option<usize> {
             }
         }
         let mut add = |words: [&str; 2]| stage.push((2, words.map(str::to_owned).to_vec()));
-        if shows {
+        if shows && !placed {
             add(["tcGen", "lightmap"]);
         }
         if !generated {
@@ -289,6 +298,17 @@ mod tests {
         assert!(
             text.contains("depthFunc equal\n\t\ttcGen lightmap\n\t\trgbGen identityLighting\n")
         );
+    }
+
+    #[test]
+    fn an_image_that_a_script_names_is_replaced() {
+        let script = "wall\n{\n{\nmap maps/m/lm_0003.tga\nrgbGen identity\ntcGen lightmap\n}\n\
+            {\nmap textures/wall.tga\nblendFunc filter\nrgbGen identity\n}\n}\n";
+        let text = written(script, "wall");
+        assert!(!text.contains("lm_0003"), "{text}");
+        assert_eq!(text.matches("map maps/m/lm_0000.tga").count(), 1, "{text}");
+        assert_eq!(text.matches("tcGen lightmap").count(), 1, "{text}");
+        assert!(text.contains("map textures/wall.tga"), "{text}");
     }
 
     #[test]
