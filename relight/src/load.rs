@@ -284,6 +284,7 @@ impl RelitWorld {
 
     fn measure_materials_with(&mut self, finder: &mut light::Finder<'_>) {
         let corners = self.corner_colors();
+        finder.prepare_materials(&self.materials);
         for (material, corners) in self.materials.iter_mut().zip(corners) {
             material.measure_reflection(finder, corners);
             material.shown = if material.is_sky() {

@@ -15,6 +15,7 @@ use crate::overbright;
 use glam::{Vec2, Vec3, Vec4};
 use image::{DynamicImage, ImageDecoder, ImageFormat};
 use std::io::Cursor;
+use support::parallel;
 
 /// The most pixels that an image may have: 2²⁶, an 8192 × 8192 picture. Checked before pixels are
 /// decoded, so that a header of a few bytes cannot ask for gigabytes.
@@ -186,25 +187,48 @@ pub fn load(files: &dyn GameFiles, name: &str) -> Result<Option<(Image, String)>
     if let Some(image) = built_in(name) {
         return Ok(Some((image, name.to_owned())));
     }
-    let (stem, written) = match split_extension(name) {
-        Some((stem, ext)) if known(ext) => (stem, Some(ext.to_ascii_lowercase())),
-        _ => (name, None),
-    };
-    if let Some(ext) = &written
-        && let Some(image) = load_one(files, name, ext)?
-    {
-        return Ok(Some((image, name.to_owned())));
-    }
-    for ext in extensions() {
-        if written.as_deref() == Some(ext) {
-            continue;
-        }
-        let file = format!("{stem}.{ext}");
-        if let Some(image) = load_one(files, &file, ext)? {
+    for (file, extension) in candidates(name) {
+        if let Some(image) = load_one(files, &file, &extension)? {
             return Ok(Some((image, file)));
         }
     }
     Ok(None)
+}
+
+/// Most files that are read before they are decoded.
+const BATCH: usize = 64;
+
+/// [`load`] of several images: reads their files on this thread, and decodes them on all cores. `keep`: what is kept of a
+/// picture.
+pub fn load_all<T: Send>(
+    files: &dyn GameFiles,
+    names: &[&str],
+    keep: impl Fn(Image) -> T + Sync,
+) -> Vec<Result<Option<T>, ImageError>> {
+    let read = |name: &&str| {
+        let read = |(file, extension): (String, String)| {
+            let bytes = files.read(&file).ok()??;
+            Some((file, extension, bytes))
+        };
+        candidates(name).find_map(read)
+    };
+    let usual = |(file, extension, bytes): &(String, String, Vec<u8>)| {
+        let cut = is_cut_jpeg(extension, bytes);
+        decode(file, extension, bytes).ok().filter(|_| !cut)
+    };
+    names
+        .chunks(BATCH)
+        .flat_map(|names| {
+            let read: Vec<_> = names.iter().map(read).collect();
+            let kept = parallel::map(&read, |_, file| file.as_ref().and_then(usual).map(&keep));
+            let found = |(name, kept): (&&str, Option<T>)| match kept {
+                Some(kept) => Ok(Some(kept)),
+                // built in, missing or faulty: with messages, and the search after them
+                None => load(files, name).map(|found| found.map(|(image, _)| keep(image))),
+            };
+            names.iter().zip(kept).map(found).collect::<Vec<_>>()
+        })
+        .collect()
 }
 
 /// The game path of the file that [`load`] would try first among those that exist, without reading it.
@@ -212,18 +236,24 @@ pub fn find(files: &dyn GameFiles, name: &str) -> Option<String> {
     if built_in(name).is_some() {
         return Some(name.to_owned());
     }
-    let stem = match split_extension(name) {
-        Some((stem, ext)) if known(ext) => {
-            if files.exists(name) {
-                return Some(name.to_owned());
-            }
-            stem
-        }
-        _ => name,
-    };
-    extensions()
-        .map(|ext| format!("{stem}.{ext}"))
+    candidates(name)
+        .map(|(file, _)| file)
         .find(|file| files.exists(file))
+}
+
+/// Files that an image may lie in, and their extensions in lower case: as written, then with the others.
+fn candidates(name: &str) -> impl Iterator<Item = (String, String)> {
+    let (stem, written) = match split_extension(name) {
+        Some((stem, ext)) if known(ext) => (stem, Some(ext.to_ascii_lowercase())),
+        _ => (name, None),
+    };
+    let others = extensions().filter({
+        let written = written.clone();
+        move |ext| written.as_deref() != Some(ext)
+    });
+    let others = others.map(move |ext| (format!("{stem}.{ext}"), ext.to_owned()));
+    let written = written.map(|ext| (name.to_owned(), ext));
+    written.into_iter().chain(others)
 }
 
 /// The engine's built-in images that scripts can name: `*white`, 8 × 8, and `*default`, here opaque.

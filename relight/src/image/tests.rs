@@ -260,6 +260,17 @@ fn extensions_fall_back_as_in_the_engine() {
     assert_eq!(shade("g.png"), found(6, "g.png"));
     assert_eq!(find(&files, "b.tga").as_deref(), Some("b.png"));
     assert!(load(&files, "../x").is_err());
+    // many at once give the same
+    let names = [
+        "a.png", "a", "B.TGA", "a.xyz", "c.png", "g", "*white", "../x",
+    ]
+    .repeat(20);
+    let all = load_all(&files, &names, |image| image.rgba[0]);
+    assert_eq!(all.len(), names.len());
+    for (name, found) in names.iter().zip(all) {
+        let one = load(&files, name).map(|found| found.map(|(image, _)| image.rgba[0]));
+        assert_eq!(format!("{found:?}"), format!("{one:?}"), "{name}");
+    }
 }
 
 #[test]

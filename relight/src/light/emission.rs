@@ -60,6 +60,14 @@ pub(super) fn directed(material: &WorldMaterial) -> Option<(f32, f32)> {
     (surface_light > 0.0 || dome > 0.0).then_some((surface_light, dome))
 }
 
+/// Images of the sides of a sky's box.
+fn sky_sides(material: &WorldMaterial) -> Vec<String> {
+    let sky = material.resolved.definition().sky.as_ref();
+    let outer = sky.and_then(|sky| sky.outer.as_ref());
+    let sides = |outer| ["rt", "lf", "bk", "ft", "up", "dn"].map(|side| format!("{outer}_{side}"));
+    outer.map(sides).into_iter().flatten().collect()
+}
+
 /// Computes what materials emit; keeps small copies of the images.
 pub(crate) struct Finder<'a> {
     files: &'a dyn GameFiles,
@@ -156,17 +164,10 @@ impl<'a> Finder<'a> {
     /// Mean radiance of a sky: the existing sides of its box, and its clouds.
     pub fn sky_radiance(&mut self, material: &WorldMaterial) -> Vec3 {
         let clouds = self.shown(material);
-        let outer = material
-            .resolved
-            .definition()
-            .sky
-            .as_ref()
-            .and_then(|sky| sky.outer.clone());
         let mut sum = Vec3::ZERO;
         let mut sides = 0.0f32;
-        for side in ["rt", "lf", "bk", "ft", "up", "dn"] {
-            let name = outer.as_ref().map(|outer| format!("{outer}_{side}"));
-            if let Some(image) = name.and_then(|name| self.image(&name)) {
+        for name in sky_sides(material) {
+            if let Some(image) = self.image(&name) {
                 sum += image.mean_linear();
                 sides += 1.0;
             }
@@ -230,19 +231,41 @@ impl<'a> Finder<'a> {
     /// The small copy of an image, if the image exists.
     pub(super) fn image(&mut self, name: &str) -> Option<&Image> {
         if !self.images.contains_key(name) {
-            let loaded = image::load(self.files, name).unwrap_or_else(|problem| {
+            self.prepare(&[name]);
+        }
+        self.images.get(name)?.as_ref()
+    }
+
+    /// Loads images, as far as they are not loaded.
+    fn prepare(&mut self, names: &[&str]) {
+        let mut names = names.to_vec();
+        names.sort_unstable();
+        names.dedup();
+        names.retain(|name| !self.images.contains_key(*name));
+        let loaded = image::load_all(self.files, &names, |mut image| {
+            while image.width.max(image.height) > SAMPLE_SIDE {
+                image = image.halve();
+            }
+            image
+        });
+        for (name, loaded) in names.into_iter().zip(loaded) {
+            let small = loaded.unwrap_or_else(|problem| {
                 log::warn!("{problem}");
                 None
             });
-            let small = loaded.map(|(mut image, _)| {
-                while image.width.max(image.height) > SAMPLE_SIDE {
-                    image = image.halve();
-                }
-                image
-            });
             self.images.insert(name.to_owned(), small);
         }
-        self.images.get(name)?.as_ref()
+    }
+
+    /// Loads what [`shades`](Self::shades) and [`sky_radiance`](Self::sky_radiance) need of materials, on all cores.
+    pub fn prepare_materials(&mut self, materials: &[WorldMaterial]) {
+        let (skies, others): (Vec<_>, Vec<_>) = materials.iter().partition(|m| m.is_sky());
+        let sides: Vec<String> = skies.into_iter().flat_map(sky_sides).collect();
+        let stages = others
+            .into_iter()
+            .flat_map(|m| m.resolved.shader.image_names());
+        let names: Vec<&str> = sides.iter().map(String::as_str).chain(stages).collect();
+        self.prepare(&names);
     }
 }
 
