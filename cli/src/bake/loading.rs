@@ -121,7 +121,7 @@ pub fn load(args: &BakeArgs, map: &str, times: &mut Times) -> Result<Loaded> {
         }
         lay_out(args, &source, &mut changed, (external, &images))?;
         times.begin("world of the layout");
-        world = with_layout(&source, &changed, world);
+        world = with_layout(&source, &changed, &world);
     }
     let shared = if laid_out {
         0
@@ -231,7 +231,7 @@ fn lay_out(
 }
 
 /// The world of a map with a new layout, with the light of the one before.
-fn with_layout(source: &Source, bsp: &Bsp, before: RelitWorld) -> RelitWorld {
+fn with_layout(source: &Source, bsp: &Bsp, before: &RelitWorld) -> RelitWorld {
     let options = Options {
         calibrate: None,
         by_hand: false,
@@ -243,7 +243,7 @@ fn with_layout(source: &Source, bsp: &Bsp, before: RelitWorld) -> RelitWorld {
     world.measure_materials(files);
     // materials by hand; the lights are replaced
     world.read_by_hand(files);
-    world.set_lighting(before.lighting());
+    world.take_lighting(before);
     // a page in place of the image that the script names
     for (surface, stored) in world.surfaces.iter_mut().zip(&bsp.surfaces) {
         if stored.lightmap >= 0 && surface.light_page >= 0 {

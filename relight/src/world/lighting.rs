@@ -1,11 +1,12 @@
 //! A snapshot of a world's light, to switch between the directives' light and the calibrated light.
 
-use super::RelitWorld;
+use super::{RelitWorld, WorldMaterial};
 use crate::emitters::{
     CalibrationReport, Emission, LightLists, LightReport, PointLight, SunLight, TriangleLight,
 };
 use crate::exposure::Exposure;
 use glam::Vec3;
+use std::collections::HashMap;
 
 /// Everything that [`measure_materials`](RelitWorld::measure_materials), [`calibrate`](crate::calibrate()) and
 /// [`sweep`](crate::light::sweep()) change in a world.
@@ -15,10 +16,8 @@ pub struct Lighting {
     triangle_lights: Vec<u32>,
     /// First light and number of lights of each surface.
     of_surfaces: Vec<(u32, u32)>,
-    /// Of each material.
-    emissions: Vec<Option<Emission>>,
-    /// Whether light passes each material.
-    passed: Vec<bool>,
+    /// Emission of each material, and whether light passes it.
+    of_materials: Vec<(Option<Emission>, bool)>,
     point_lights: Vec<PointLight>,
     suns: Vec<SunLight>,
     light_lists: LightLists,
@@ -41,8 +40,7 @@ impl RelitWorld {
             of_surfaces: (self.surfaces.iter())
                 .map(|s| (s.first_light, s.num_lights))
                 .collect(),
-            emissions: self.materials.iter().map(|m| m.emission).collect(),
-            passed: self.materials.iter().map(|m| m.class.passed).collect(),
+            of_materials: self.materials.iter().map(light_of).collect(),
             point_lights: self.point_lights.clone(),
             suns: self.suns.clone(),
             light_lists: self.light_lists.clone(),
@@ -64,11 +62,8 @@ impl RelitWorld {
         for (surface, (first, count)) in self.surfaces.iter_mut().zip(lighting.of_surfaces) {
             (surface.first_light, surface.num_lights) = (first, count);
         }
-        for (material, emission) in self.materials.iter_mut().zip(lighting.emissions) {
-            material.emission = emission;
-        }
-        for (material, passed) in self.materials.iter_mut().zip(lighting.passed) {
-            material.class.passed = passed;
+        for (material, (emission, passed)) in self.materials.iter_mut().zip(lighting.of_materials) {
+            (material.emission, material.class.passed) = (emission, passed);
             if passed {
                 material.holes = None;
             }
@@ -85,4 +80,33 @@ impl RelitWorld {
         self.has_compiled_lights = lighting.has_compiled_lights;
         self.exposure = lighting.exposure;
     }
+
+    /// Takes the light of a world with the same surfaces and other lightmap coordinates. These decide how materials are
+    /// lit, so that the same material may have another number.
+    pub fn take_lighting(&mut self, other: &RelitWorld) {
+        let key = |m: &WorldMaterial| {
+            (
+                m.name.to_ascii_lowercase(),
+                m.surface_flags,
+                m.content_flags,
+            )
+        };
+        let others: HashMap<_, _> = (other.materials.iter())
+            .map(|material| (key(material), light_of(material)))
+            .collect();
+        let of_materials = self.materials.iter().map(|material| {
+            let found = others.get(&key(material)).copied();
+            found.unwrap_or_else(|| light_of(material))
+        });
+        let lighting = Lighting {
+            of_materials: of_materials.collect(),
+            ..other.lighting()
+        };
+        self.set_lighting(lighting);
+    }
+}
+
+/// Emission of a material, and whether light passes it.
+fn light_of(material: &WorldMaterial) -> (Option<Emission>, bool) {
+    (material.emission, material.class.passed)
 }

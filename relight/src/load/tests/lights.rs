@@ -461,6 +461,41 @@ fn splashes_in_solid_are_dropped() {
 }
 
 #[test]
+fn light_moves_to_a_map_with_other_light_coordinates() {
+    let map = |first: i32| {
+        let mut map = MapBuilder::new();
+        let page = map.add_lightmap([128; 3]);
+        let wall = map.add_shader("t/wall", 0, 1);
+        let lamp = map.add_shader("t/lamp", 0, 1);
+        for (place, lightmap) in [first, page].into_iter().enumerate() {
+            let quad = map.add_quad(wall, ceiling_lamp(16.0, 100.0 + place as f32));
+            map.set_lightmap(quad, lightmap);
+        }
+        let quad = map.add_quad(lamp, ceiling_lamp(16.0, 127.0));
+        map.set_lightmap(quad, page);
+        map
+    };
+    let before = compiled(map(q3bsp::lightmap_index::BY_VERTEX));
+    let mut after = relight(map(0));
+    // the wall of one light by vertices and one by texels is two materials before
+    assert_eq!((before.materials.len(), after.materials.len()), (3, 2));
+    for material in &mut after.materials {
+        material.emission = None;
+    }
+    after.take_lighting(&before);
+    let strengths = |world: &RelitWorld, name: &str| {
+        let named = world.materials.iter().filter(|m| m.name == name);
+        named
+            .map(|m| m.emission.map(|e| e.strength))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(strengths(&after, "t/wall"), [None]);
+    assert_eq!(strengths(&after, "t/lamp"), strengths(&before, "t/lamp"));
+    assert!(strengths(&after, "t/lamp")[0].is_some());
+    assert_eq!(after.lights, before.lights);
+}
+
+#[test]
 fn rays_give_what_q3map2_stores_of_points() {
     use crate::bake::{Gather, Point, Rays};
     let stored = |light: &str, height: f32| {
