@@ -255,7 +255,7 @@ impl Accel {
             };
             let prepared = self
                 .shapes
-                .prepare(rec, view, &self.parts, part, vertices, pose)?;
+                .prepare(view, &self.parts, part, vertices, pose)?;
             self.cost.parts += u64::from(part.animated);
             feedback.add_geometry(part.instance, part.animated);
             let record = GeometryRecord {
@@ -273,6 +273,7 @@ impl Accel {
                 placed.of_model = part.of_model;
             }
         }
+        self.shapes.fit(rec, view)?;
         for (index, slot) in self.parts.slots.iter().enumerate() {
             if slot.triangles.is_empty() {
                 continue;

@@ -11,8 +11,7 @@ use std::collections::HashMap;
 
 use shaders::types::constants as c;
 use shaders::types::{Triangle, Vertex};
-use support::Aabb;
-use support::slice;
+use support::{Aabb, parallel, slice};
 
 use super::part_mesh::{MeshPart, members};
 use super::parts::{Part, Parts, ShapeMesh, SkinMesh};
@@ -20,11 +19,14 @@ use super::tracer::Tracer;
 use crate::gpu::{BlasBuild, Buffer, BufferUsage, CompactedSizes, Device, Error, Pass, Recorder};
 use crate::scene::TracedScene;
 
-use animated::{AnimatedShape, PoseKey, Scratch};
+use animated::{AnimatedShape, PoseKey};
 use rigid::RigidShape;
 
 /// Number of frames out of view after which a structure is dropped.
 const KEPT: u64 = 1000;
+/// Most hierarchies that wait in memory for their way to the device.
+const FITTED: usize = 1024;
+
 /// A part's bottom-level structure, as the top level refers to it.
 #[derive(Clone, Copy, Debug)]
 pub enum Bottom {
@@ -99,7 +101,8 @@ pub struct Shapes {
     skins: HashMap<Box<[SkinMesh]>, Skin>,
     /// Structures with pending queries of their compacted sizes.
     asked: Vec<(CompactedSizes, Vec<Box<[ShapeMesh]>>)>,
-    scratch: Scratch,
+    /// Number of refits and builds of animated parts, over all frames.
+    refits: u64,
 }
 
 impl Shapes {
@@ -114,7 +117,7 @@ impl Shapes {
             animated: HashMap::new(),
             skins: HashMap::new(),
             asked: Vec::new(),
-            scratch: Scratch::default(),
+            refits: 0,
         }
     }
 
@@ -139,7 +142,7 @@ impl Shapes {
 
     /// Number of refits and builds of animated parts, over all frames.
     pub fn refits(&self) -> u64 {
-        self.scratch.refits
+        self.refits
     }
 
     /// Number of kept shapes: of constant shape, and refitted structures.
@@ -166,7 +169,6 @@ impl Shapes {
     /// Out of memory.
     pub fn prepare(
         &mut self,
-        rec: &mut Recorder,
         view: &TracedScene,
         parts: &Parts,
         part: &Part,
@@ -178,7 +180,7 @@ impl Shapes {
         let (address, pose, version) = if part.animated {
             let vertices = vertices + (part.vertices.start * size_of::<Vertex>()) as u64;
             let (pose, version) =
-                self.prepare_animated(rec, view, part, (key, used), &meshes, vertices)?;
+                self.prepare_animated(view, part, (key, used), &meshes, vertices)?;
             (vertices, pose, version)
         } else {
             (
@@ -197,7 +199,24 @@ impl Shapes {
         })
     }
 
-    /// A part's structure for the top level, after [`build`](Self::build).
+    /// Fits our own hierarchies of animated parts to this frame's vertices, on all cores.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn fit(&mut self, rec: &mut Recorder, view: &TracedScene) -> Result<(), Error> {
+        let shapes = self.animated.values_mut();
+        let mut due: Vec<_> = shapes.flat_map(AnimatedShape::due).collect();
+        while !due.is_empty() {
+            let mut some = due.split_off(due.len().saturating_sub(FITTED));
+            parallel::each(&mut some, |fit| fit.compute(&view.vertices));
+            for fit in some {
+                fit.store(rec, &self.device)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A part's structure for the top level, after [`fit`](Self::fit) and [`build`](Self::build).
     pub fn bottom(&self, parts: &Parts, part: &Part, prepared: &Prepared) -> Option<Bottom> {
         let key = parts.shapes.get(part.members.clone())?;
         if part.animated {
@@ -295,7 +314,6 @@ impl Shapes {
     /// The shape's pose, and the version of its triangles.
     fn prepare_animated(
         &mut self,
-        rec: &mut Recorder,
         view: &TracedScene,
         part: &Part,
         (key, used): (&[ShapeMesh], Use),
@@ -314,15 +332,13 @@ impl Shapes {
             return Ok((PoseKey::default(), 0)); // just inserted
         };
         shape.seen = self.frame;
-        let posed = slice::part(&view.vertices, part.vertices.clone());
         let pose = shape.take_pose(
-            rec,
             &self.device,
             (part.kind, used),
-            posed,
+            (&view.vertices, part.vertices.clone()),
             vertices,
-            &mut self.scratch,
-        )?;
+            &mut self.refits,
+        );
         Ok((pose, shape.version()))
     }
 

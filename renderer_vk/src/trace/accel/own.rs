@@ -3,8 +3,8 @@
 use glam::Vec3;
 use shaders::trace_types::BvhInstance;
 use shaders::trace_types::constants::INSTANCE_GRID;
-use support::Aabb;
 use support::bvh::Hierarchy;
+use support::{Aabb, parallel};
 
 use super::kept::Kept;
 use super::placements::{Part, Placement};
@@ -28,6 +28,10 @@ impl Accel {
         let mut of_models = Vec::new();
         let positions = &self.parts.positions;
         let position = |i: u32| positions.get(i as usize).copied().unwrap_or(Vec3::NAN);
+        let built = parallel::map(&self.parts.slots, |_, slot| {
+            let corners = slot.indices.iter().map(|t| t.map(position));
+            build_triangles(&corners.collect::<Vec<_>>())
+        });
         let mut changing = 0;
         for p in placed {
             let found = match &p.part {
@@ -41,22 +45,18 @@ impl Accel {
                     triangles: grid.triangles.address(),
                     bounds: grid.bounds,
                 }),
-                Part::Slot(index) => {
-                    let indices = self.parts.slots.get(*index).map_or(&[][..], |s| &s.indices);
-                    let corners: Vec<[Vec3; 3]> = indices.iter().map(|t| t.map(position)).collect();
-                    match build_triangles(&corners) {
-                        Some(hierarchy) => {
-                            changing += size_of_val(hierarchy.nodes.as_slice())
-                                + size_of_val(hierarchy.triangles.as_slice());
-                            Some(OwnBottom {
-                                nodes: rec.arena().push(&hierarchy.nodes)?,
-                                triangles: rec.arena().push(&hierarchy.triangles)?,
-                                bounds: hierarchy.bounds,
-                            })
-                        }
-                        None => None,
+                Part::Slot(index) => match built.get(*index).and_then(Option::as_ref) {
+                    Some(hierarchy) => {
+                        changing += size_of_val(hierarchy.nodes.as_slice())
+                            + size_of_val(hierarchy.triangles.as_slice());
+                        Some(OwnBottom {
+                            nodes: rec.arena().push(&hierarchy.nodes)?,
+                            triangles: rec.arena().push(&hierarchy.triangles)?,
+                            bounds: hierarchy.bounds,
+                        })
                     }
-                }
+                    None => None,
+                },
                 Part::Kept(index, prepared) => {
                     let part = self.parts.parts.get(*index);
                     match part.and_then(|part| self.shapes.bottom(&self.parts, part, prepared)) {

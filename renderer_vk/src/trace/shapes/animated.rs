@@ -9,13 +9,13 @@
 //! every [`OMITTED`]th frame.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use glam::Vec3;
-#[cfg(test)]
 use shaders::trace_types::{BvhNode, BvhTriangle};
 use shaders::types::Vertex;
-use support::Aabb;
 use support::bvh::Hierarchy;
+use support::{Aabb, slice};
 
 use super::super::bvh::{TRIANGLES, ordered, widen};
 use super::super::input::Kind;
@@ -89,16 +89,84 @@ enum PoseBottom {
         bottom: Option<OwnBottom>,
         /// Nodes and triangles of `bottom`, if they last longer than a frame.
         kept: Option<Buffer>,
+        /// What it is to be fitted to in this frame.
+        due: Option<Due>,
     },
 }
 
-/// Reused memory for refits of our hierarchies, and their number.
-#[derive(Default)]
-pub struct Scratch {
-    /// Number of all refits and builds.
-    pub refits: u64,
-    boxes: Vec<Aabb>,
-    corners: Vec<[Vec3; 3]>,
+/// What a hierarchy of ours is to be fitted to.
+struct Due {
+    /// The vertices of the view.
+    vertices: Range<usize>,
+    /// Whether it lasts longer than a frame.
+    lasts: bool,
+}
+
+/// A hierarchy of ours that is to be fitted.
+pub struct Fit<'a> {
+    indices: &'a [[u32; 3]],
+    hierarchy: &'a mut Hierarchy,
+    cost: &'a mut f32,
+    bottom: &'a mut Option<OwnBottom>,
+    kept: &'a mut Option<Buffer>,
+    due: Due,
+    fitted: Option<Fitted>,
+}
+
+/// A fitted hierarchy in the GPU's form.
+struct Fitted {
+    nodes: Vec<BvhNode>,
+    triangles: Vec<BvhTriangle>,
+    bounds: Aabb,
+}
+
+impl Fit<'_> {
+    /// Fits the hierarchy to its vertices. `all`: those of the view.
+    pub fn compute(&mut self, all: &[Vertex]) {
+        let vertices = slice::part(all, self.due.vertices.clone());
+        let position = |i: u32| vertices.get(i as usize).map_or(Vec3::NAN, |v| v.position);
+        let corners: Vec<[Vec3; 3]> = self.indices.iter().map(|t| t.map(position)).collect();
+        let boxes: Vec<Aabb> = corners.iter().map(|&c| Aabb::of(c)).collect();
+        self.fitted = fit(self.hierarchy, self.cost, &boxes).map(|bounds| Fitted {
+            nodes: widen(self.hierarchy),
+            triangles: ordered(self.hierarchy, &corners),
+            bounds,
+        });
+    }
+
+    /// Stores it on the device.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn store(self, rec: &mut Recorder, device: &Device) -> Result<(), Error> {
+        (*self.bottom, *self.kept) = (None, None);
+        let Some(fitted) = self.fitted else {
+            return Ok(()); // without a triangle
+        };
+        let [nodes, triangles] = if self.due.lasts {
+            let bytes = [
+                bytemuck::cast_slice::<_, u8>(&fitted.nodes),
+                bytemuck::cast_slice(&fitted.triangles),
+            ];
+            let (name, storage) = ("trace animated kept", BufferUsage::STORAGE);
+            let buffer = Buffer::with_data(device, name, storage, &bytes.concat())?;
+            let address = buffer.address();
+            *self.kept = Some(buffer);
+            [
+                address,
+                address + size_of_val(fitted.nodes.as_slice()) as u64,
+            ]
+        } else {
+            let arena = rec.arena();
+            [arena.push(&fitted.nodes)?, arena.push(&fitted.triangles)?]
+        };
+        *self.bottom = Some(OwnBottom {
+            nodes,
+            triangles,
+            bounds: fitted.bounds,
+        });
+        Ok(())
+    }
 }
 
 impl AnimatedShape {
@@ -235,20 +303,41 @@ impl AnimatedShape {
         }
     }
 
-    /// Assigns a pose to vertices and their device address: that of the body, or the next. Refits our own hierarchy at
-    /// once, leaves the driver's structure to [`pending`](Self::pending).
-    ///
-    /// # Errors
-    /// Out of memory.
+    /// Hierarchies of ours that are to be fitted in this frame.
+    pub fn due(&mut self) -> impl Iterator<Item = Fit<'_>> {
+        let (poses, indices) = (&mut self.poses, self.indices.as_slice());
+        let all = poses.iter_mut().chain(self.of_bodies.values_mut());
+        all.filter_map(move |pose| match &mut pose.bottom {
+            PoseBottom::Own {
+                hierarchy,
+                cost,
+                bottom,
+                kept,
+                due,
+            } => Some(Fit {
+                due: due.take()?,
+                indices,
+                hierarchy,
+                cost,
+                bottom,
+                kept,
+                fitted: None,
+            }),
+            PoseBottom::Driver { .. } => None,
+        })
+    }
+
+    /// Assigns a pose to vertices and their device address: that of the body, or the next. Leaves our own hierarchy to
+    /// [`due`](Self::due), and the driver's structure to [`pending`](Self::pending). `range`: of `all` vertices of the
+    /// view; `refits`: number of refits and builds.
     pub fn take_pose(
         &mut self,
-        rec: &mut Recorder,
         device: &Device,
         (kind, used): (Kind, Use),
-        vertices: &[Vertex],
+        (all, range): (&[Vertex], Range<usize>),
         address: u64,
-        scratch: &mut Scratch,
-    ) -> Result<PoseKey, Error> {
+        refits: &mut u64,
+    ) -> PoseKey {
         let own = self.index_buffer.is_none();
         // a second part of this shape on one body is not followed
         let is_free = |pose: &Pose| pose.seen != self.seen;
@@ -270,16 +359,16 @@ impl AnimatedShape {
             }
         };
         let Some(pose) = pose else {
-            return Ok(key); // just pushed
+            return key; // just pushed
         };
         pose.seen = self.seen;
         let omitted = body.filter(|_| !used.refit);
         // spreads the refits of omitted bodies over frames
         let is_due = |body: u32| (self.seen + u64::from(body)).is_multiple_of(OMITTED);
         if omitted.is_some_and(|body| !is_due(body)) && pose.is_kept() {
-            return Ok(key);
+            return key;
         }
-        scratch.refits += 1;
+        *refits += 1;
         let spread = match key {
             PoseKey::Ordered(index) => u32::try_from(index).unwrap_or(0),
             PoseKey::OfBody(body) => body,
@@ -291,6 +380,7 @@ impl AnimatedShape {
                 refits,
                 pending,
             } => {
+                let vertices = slice::part(all, range);
                 let bounds = Aabb::of(vertices.iter().map(|v| v.position)).half_area();
                 let fits = *refits < REFITS && bounds <= *area * GROWN && bounds * GROWN >= *area;
                 let refit = fits && blas.address() != 0 && *area > 0.0;
@@ -305,43 +395,14 @@ impl AnimatedShape {
                 let geometry = geometry(kind, address, vertices.len(), at, self.indices.len());
                 *pending = Some(([geometry], refit));
             }
-            PoseBottom::Own {
-                hierarchy,
-                cost,
-                bottom,
-                kept,
-            } => {
-                let Scratch { boxes, corners, .. } = scratch;
-                let position = |i: u32| vertices.get(i as usize).map_or(Vec3::NAN, |v| v.position);
-                corners.clear();
-                corners.extend(self.indices.iter().map(|t| t.map(position)));
-                boxes.clear();
-                boxes.extend(corners.iter().map(|&c| Aabb::of(c)));
-                (*bottom, *kept) = (None, None);
-                if let Some(bounds) = fit(hierarchy, cost, boxes) {
-                    let (nodes, triangles) = (widen(hierarchy), ordered(hierarchy, corners));
-                    let [nodes, triangles] = if omitted.is_some() {
-                        let bytes = [
-                            bytemuck::cast_slice::<_, u8>(&nodes),
-                            bytemuck::cast_slice(&triangles),
-                        ];
-                        let (name, storage) = ("trace animated kept", BufferUsage::STORAGE);
-                        let buffer = Buffer::with_data(device, name, storage, &bytes.concat())?;
-                        let address = buffer.address();
-                        *kept = Some(buffer);
-                        [address, address + size_of_val(nodes.as_slice()) as u64]
-                    } else {
-                        [rec.arena().push(&nodes)?, rec.arena().push(&triangles)?]
-                    };
-                    *bottom = Some(OwnBottom {
-                        nodes,
-                        triangles,
-                        bounds,
-                    });
-                }
+            PoseBottom::Own { due, .. } => {
+                *due = Some(Due {
+                    vertices: range,
+                    lasts: omitted.is_some(),
+                });
             }
         }
-        Ok(key)
+        key
     }
 }
 
@@ -354,6 +415,7 @@ impl Pose {
                 cost: 0.0,
                 bottom: None,
                 kept: None,
+                due: None,
             }
         } else {
             let flags = BlasFlags {
