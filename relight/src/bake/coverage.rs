@@ -102,6 +102,20 @@ impl PageTriangle {
         position
     }
 
+    /// A texel of the triangle's plane, whether the triangle covers it or not.
+    fn square(&self, texel: Vec2) -> Square {
+        let [e1, e2] = self.edges;
+        let [a, b, c] = self.vertices.map(|v| v.position);
+        let on_plane = |offset: Vec2| {
+            let weights = Vec2::new(offset.perp_dot(e2), e1.perp_dot(offset)) / self.determinant;
+            (b - a) * weights.x + (c - a) * weights.y
+        };
+        Square {
+            middle: a + on_plane(texel + 0.5 - self.origin),
+            half: [Vec2::X, Vec2::Y].map(|side| on_plane(side * 0.5)),
+        }
+    }
+
     /// Its middle.
     pub fn middle(&self) -> Vec3 {
         let [a, b, c] = self.vertices.map(|v| v.position);
@@ -122,6 +136,17 @@ pub struct Place {
     pub normal: Vec3,
     /// Middle of the triangle that it is on.
     pub middle: Vec3,
+    /// Its texel in the plane of the triangle.
+    pub square: Square,
+}
+
+/// A texel in the plane of a triangle, model space.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Square {
+    /// Its middle, which may lie beyond the triangle.
+    pub middle: Vec3,
+    /// Half its sides.
+    pub half: [Vec3; 2],
 }
 
 /// Finds the places in a page's texels, a pattern of `pattern` × `pattern` places each: of a texel that a triangle touches
@@ -160,6 +185,7 @@ pub fn places(side: usize, pattern: u32, triangles: &[(u32, PageTriangle)]) -> V
                             position,
                             normal,
                             middle: triangle.middle(),
+                            square: triangle.square(Vec2::new(x as f32, y as f32)),
                         });
                         if alone {
                             break;
@@ -276,6 +302,24 @@ mod tests {
             assert!((place.position - middle.extend(3.0)).length() < 2.0e-3);
         }
         assert_eq!(places(8, 4, &square(1.0, 1.0, 3.0, 2.0)).len(), 32);
+    }
+
+    #[test]
+    fn a_place_has_its_whole_texel() {
+        // a strip a tenth of a texel wide, which covers no middle of a texel
+        let found = places(8, 1, &square(0.9, 0.1, 5.2, 0.2));
+        assert_eq!(found.len(), 6);
+        for (place, x) in found.iter().zip(0u8..) {
+            let expected = Square {
+                middle: Vec3::new(f32::from(x) + 0.5, 0.5, 3.0),
+                half: [Vec3::X * 0.5, Vec3::Y * 0.5],
+            };
+            let found = place.square;
+            assert!(found.middle.distance(expected.middle) < 1e-4, "{found:?}");
+            for (found, expected) in found.half.iter().zip(expected.half) {
+                assert!(found.distance(expected) < 1e-5, "{found}");
+            }
+        }
     }
 
     #[test]

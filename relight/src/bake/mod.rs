@@ -15,6 +15,7 @@
 //! * [`seams`]: equal light on both sides of an edge between two charts.
 //! * [`store`]: pages written into a map, beside it, and into packs.
 
+mod compiler_place;
 mod coverage;
 mod dirt;
 mod encode;

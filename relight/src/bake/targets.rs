@@ -1,6 +1,6 @@
 //! Where a map stores light, and the points that stand for each place.
 
-use super::coverage::{INSET, PageTriangle, Place, places};
+use super::coverage::{INSET, PageTriangle, Place, Square, places};
 use super::solids::Solids;
 use super::{LitTriangle, Point};
 use crate::world::{RelitWorld, WorldMaterial, WorldSurface};
@@ -12,7 +12,7 @@ use support::parallel;
 use support::slice::{self, span};
 
 /// Distance of a point from its surface, id units: as compilers have it.
-const LIFT: f32 = 1.0;
+pub(super) const LIFT: f32 = 1.0;
 
 /// Depth inside a brush from which a point is inside, id units, negative inside.
 const INSIDE: f32 = -0.5;
@@ -139,12 +139,18 @@ impl Targets {
                 }
             }
         }
+        // the one point of a texel lies where the compiler has it
+        let as_compiler = pattern == 1 && world.has_compiled_lights;
         let found = parallel::map(&of_page, |page, triangles| {
             places(slice::item(&sides, page), pattern, triangles)
         });
         // pages differ in size, and a map may have one alone
         let tasks: Vec<&[Place]> = found.iter().flat_map(|p| p.chunks(TASK)).collect();
-        let free = |_, some: &&[Place]| some.iter().map(|place| space.point(place)).collect();
+        let free = |place: &Place| match as_compiler {
+            true => space.compiler_point(place).or_else(|| space.point(place)),
+            false => space.point(place),
+        };
+        let free = |_, some: &&[Place]| some.iter().map(free).collect();
         let mut points = parallel::map(&tasks, free)
             .into_iter()
             .flat_map(|found: Vec<Option<Point>>| found);
@@ -200,6 +206,7 @@ impl Targets {
                         .move_towards(middle, INSET),
                     normal: own.map_or(clean.normal.normalize_or(Vec3::Z), |v| v.normal),
                     middle,
+                    square: Square::default(),
                 };
                 all.push((
                     place,
@@ -251,7 +258,7 @@ fn ends(world: &RelitWorld, surface: &WorldSurface) -> Vec<[bool; 3]> {
 
 /// Space of a world in which points may lie.
 pub(super) struct FreeSpace<'a> {
-    world: &'a RelitWorld,
+    pub(super) world: &'a RelitWorld,
     solids: Solids<'a>,
     /// Whether the map has a tree that separates space from solid.
     has_leafs: bool,
@@ -269,9 +276,12 @@ impl<'a> FreeSpace<'a> {
 
     /// Whether a position is inside of the map and of nothing solid.
     pub fn has(&self, position: Vec3) -> bool {
-        position.is_finite()
-            && (!self.has_leafs || self.world.bsp.cluster_at(position) >= 0)
-            && !self.solids.hold(position, INSIDE)
+        self.is_inside(position) && !self.solids.hold(position, INSIDE)
+    }
+
+    /// Whether a position is inside of the map.
+    pub(super) fn is_inside(&self, position: Vec3) -> bool {
+        position.is_finite() && (!self.has_leafs || self.world.bsp.cluster_at(position) >= 0)
     }
 
     /// The point of a place: above its surface, moved towards the middle of its triangle if that lies in solid. `None` if

@@ -43,7 +43,7 @@ const MINS: Vec3 = Vec3::new(-256.0, -256.0, 0.0);
 const MAXS: Vec3 = Vec3::new(256.0, 256.0, 256.0);
 
 /// A room, each of its faces with a page of its own. `lights`: entities.
-fn room(lights: &[&[(&str, &str)]], add: impl Fn(&mut MapBuilder)) -> Bsp {
+pub(super) fn room(lights: &[&[(&str, &str)]], add: impl Fn(&mut MapBuilder)) -> Bsp {
     let mut map = MapBuilder::new();
     let wall = map.add_shader("t/wall", 0, 1);
     let faces = map.add_box_faces(wall, MINS, MAXS, true);
@@ -59,7 +59,7 @@ fn room(lights: &[&[(&str, &str)]], add: impl Fn(&mut MapBuilder)) -> Bsp {
     map.build()
 }
 
-fn world(bsp: &Bsp) -> RelitWorld {
+pub(super) fn world(bsp: &Bsp) -> RelitWorld {
     let mut files = MemoryFiles::new();
     files
         .insert("scripts/test.shader", SCRIPT.to_owned())
