@@ -67,6 +67,9 @@ pub struct BakeArgs {
     /// One point a texel, one shadow ray to a light, one bounce: for a first look
     #[arg(long)]
     fast: bool,
+    /// Let curves cast shadows, as the compiler's -patchshadows; those of a finished map do without it
+    #[arg(long)]
+    patch_shadows: bool,
     /// Gamma of stored light, as the compiler's -gamma; default: 1, or what calibration found
     #[arg(long, value_name = "G", value_parser = positive)]
     gamma: Option<f32>,

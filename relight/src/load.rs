@@ -248,6 +248,7 @@ impl RelitWorld {
             stored_gamma: 1.0,
             light_cutoff: 0.0,
             has_compiled_lights: false,
+            shadowless_curves: false,
             exposure: None,
             overbright_shift: options.overbright_shift,
             bsp,

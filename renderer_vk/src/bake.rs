@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use glam::Vec3;
 use relight::bake::{Gather, GatherError, GatherProgress, Light, LitSurfaces, Point};
 use relight::calibrate::Surroundings;
-use relight::{GameFiles, Materials, RelitWorld};
+use relight::{GameFiles, Materials, RelitWorld, WorldSurface};
 
 use crate::assets::Assets;
 use crate::error::Error;
@@ -58,7 +58,10 @@ struct Work {
 /// Computes light at points of one world on a GPU.
 pub struct GpuGather {
     baker: Baker,
+    /// What casts shadows.
     geometry: StaticGeometry,
+    /// What reflects light, if more than casts shadows.
+    reflecting: Option<StaticGeometry>,
     assets: Assets,
     _vertices: Buffer,
     on: Arc<BakeDevice>,
@@ -71,20 +74,26 @@ fn is_passed(world: &RelitWorld, surface: u32) -> bool {
     material.is_some_and(|m| m.class.passed && m.holes.is_none() && !m.is_sky())
 }
 
-/// The map's own geometry; brush models cast no shadow, as with map compilers.
+/// The map's own geometry that casts shadows, or all that reflects light; brush models are left out, as map compilers do it.
 fn static_scene<'a>(
     world: &'a RelitWorld,
     occluding: &'a Occluding,
     vertex_address: u64,
+    reflects: bool,
 ) -> StaticScene<'a> {
     let surfaces = occluding.surfaces.iter().zip(0..);
+    let casts = |surface: &WorldSurface| reflects || world.casts_shadow(surface);
+    let wanted = |number: u32| {
+        let surface = world.surfaces.get(number as usize);
+        surface.is_none_or(casts) && !is_passed(world, number)
+    };
     StaticScene {
         vertices: &occluding.vertices,
         vertex_address,
         mapped_address: 0,
         indices: &world.indices,
         surfaces: surfaces
-            .filter(|(s, number)| s.index_count > 0 && s.model == 0 && !is_passed(world, *number))
+            .filter(|(s, number)| s.index_count > 0 && s.model == 0 && wanted(*number))
             .map(|(s, number)| StaticSurface {
                 first_index: s.first_index,
                 index_count: s.index_count,
@@ -207,9 +216,16 @@ impl GpuGather {
             BufferUsage::STORAGE,
             &occluding.vertices,
         )?;
-        let scene = static_scene(world, &occluding, vertices.address());
         let structures = (*tracer, settings.rt_grid_cells);
-        let geometry = StaticGeometry::new(device, structures, &scene, &assets)?;
+        let geometry = |reflects| {
+            let scene = static_scene(world, &occluding, vertices.address(), reflects);
+            StaticGeometry::new(device, structures, &scene, &assets)
+        };
+        let reflecting = match world.has_shadowless() {
+            true => Some(geometry(true)?),
+            false => None,
+        };
+        let geometry = geometry(false)?;
         let lights = MapLightSource {
             triangles: &world.lights,
             points: &world.point_lights,
@@ -223,21 +239,24 @@ impl GpuGather {
         Ok(Self {
             baker: Baker::new(device, *tracer, &lights, &sky_light)?,
             geometry,
+            reflecting,
             assets,
             _vertices: vertices,
             on: Arc::clone(on),
         })
     }
 
-    /// Computes with the passes in this map's turn.
+    /// Computes with the passes in this map's turn. `reflects`: rays meet all that reflects light, not what casts shadows.
     fn compute<T>(
         &mut self,
+        reflects: bool,
         call: impl FnOnce(&mut Baker, &mut Shared<'_>, BakeScene<'_>) -> Result<T, gpu::Error>,
     ) -> Result<T, GatherError> {
         let mut turn = self.on.turn();
         let Work { passes, ring, .. } = &mut *turn;
+        let reflecting = self.reflecting.as_ref().filter(|_| reflects);
         let scene = BakeScene {
-            geometry: &self.geometry,
+            geometry: reflecting.unwrap_or(&self.geometry),
             materials: &self.assets,
         };
         call(&mut self.baker, &mut Shared { ring, passes }, scene)
@@ -256,7 +275,9 @@ impl Gather for GpuGather {
         samples: u32,
         progress: GatherProgress<'_>,
     ) -> Result<Vec<Light>, GatherError> {
-        self.compute(|baker, shared, scene| baker.direct(shared, scene, points, samples, progress))
+        self.compute(false, |baker, shared, scene| {
+            baker.direct(shared, scene, points, samples, progress)
+        })
     }
 
     fn reflected(
@@ -266,7 +287,7 @@ impl Gather for GpuGather {
         rays: u32,
         progress: GatherProgress<'_>,
     ) -> Result<Vec<Light>, GatherError> {
-        self.compute(|baker, shared, scene| {
+        self.compute(true, |baker, shared, scene| {
             baker.reflected(shared, scene, points, (&lit, rays), progress)
         })
     }
@@ -277,6 +298,8 @@ impl Gather for GpuGather {
         around: &Surroundings,
         progress: GatherProgress<'_>,
     ) -> Result<Vec<f32>, GatherError> {
-        self.compute(|baker, shared, scene| baker.nearness(shared, scene, points, around, progress))
+        self.compute(false, |baker, shared, scene| {
+            baker.nearness(shared, scene, points, around, progress)
+        })
     }
 }

@@ -218,3 +218,46 @@ fn points_of_the_light_grid_have_the_light_that_the_cpu_finds() {
         assert!(median < 0.005 && most < 0.06 && mean.abs() < 0.02);
     }
 }
+
+#[test]
+fn curves_without_shadows_are_passed_and_reflect() {
+    let Some(files) = openarena() else {
+        return;
+    };
+    let files: Arc<dyn GameFiles> = Arc::new(files);
+    let mut world = load(&*files, "maps/kaos2.bsp");
+    let points = points(&world, 600);
+    let count = world.indices.len() / 3;
+    let lit = LitSurfaces {
+        triangles: &vec![LitTriangle::Vertices([0; 3]); count],
+        reflectances: &vec![Vec3::splat(0.5); count],
+        light: &[Vec3::ONE],
+    };
+    let made = device(TracerChoice::Compute, false);
+    let Some(on) = testkit::device(made.map_err(|e| e.to_string())) else {
+        return;
+    };
+    let nothing = &mut |_| {};
+    let shadowed = Rays::new(&world)
+        .direct(&points, 0, nothing)
+        .expect("light");
+    world.shadowless_curves = true;
+    let mut gpu = gather(&on, &files, &world);
+    let mut cpu = Rays::new(&world);
+    let exact = cpu.direct(&points, 0, nothing).expect("light");
+    let found = gpu.direct(&points, 0, nothing).expect("light");
+    let brighter = exact
+        .iter()
+        .zip(&shadowed)
+        .filter(|(light, before)| light.value.y > before.value.y * 1.1);
+    let brighter = brighter.count();
+    let [median, most, mean] = differences(&found, &exact);
+    println!("{brighter} brighter; median {median}, 90 % {most}, mean {mean}");
+    assert!(brighter > 10, "{brighter}");
+    assert!(median < 0.003 && most < 0.04 && mean.abs() < 0.01);
+    let exact = cpu.reflected(&points, lit, 256, nothing).expect("light");
+    let found = gpu.reflected(&points, lit, 256, nothing).expect("light");
+    let [median, most, mean] = differences(&found, &exact);
+    println!("reflected: median {median}, 90 % {most}, mean {mean}");
+    assert!(median < 0.03 && most < 0.1 && mean.abs() < 0.02);
+}

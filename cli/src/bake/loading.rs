@@ -315,6 +315,7 @@ fn load_world(
         times.begin("materials and lights");
         world.measure_materials(files);
         world.take_compiled_lights(files);
+        world.shadowless_curves &= !args.patch_shadows;
     }
     world.read_by_hand(files);
     for warning in &world.warnings {

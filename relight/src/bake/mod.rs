@@ -26,6 +26,8 @@ mod lumps;
 mod page;
 mod rays;
 pub mod seams;
+#[cfg(test)]
+mod shadow_tests;
 mod smooth;
 mod solids;
 pub mod store;

@@ -38,6 +38,8 @@ const SKY_DIRECTIONS: [u32; 2] = [384, 1024];
 pub struct Rays<'a> {
     world: &'a RelitWorld,
     occluders: Occluders,
+    /// What reflects light, if more than casts shadows.
+    reflecting: Option<Occluders>,
     has_sky_lights: bool,
 }
 
@@ -46,7 +48,8 @@ impl<'a> Rays<'a> {
     pub fn new(world: &'a RelitWorld) -> Rays<'a> {
         Rays {
             world,
-            occluders: Occluders::of_world(world),
+            occluders: Occluders::that_shadow(world),
+            reflecting: world.has_shadowless().then(|| Occluders::of_world(world)),
             has_sky_lights: world.lights.iter().any(|light| light.is_sky),
         }
     }
@@ -310,6 +313,7 @@ impl Rays<'_> {
     }
 
     fn reflected_at(&self, point: &Point, lit: LitSurfaces<'_>, rays: u32, number: usize) -> Light {
+        let reflecting = self.reflecting.as_ref().unwrap_or(&self.occluders);
         let mut random = Random::new(0xB0CE_0000 + number as u64);
         let side = (rays.max(1) as f32).sqrt().ceil() as u32;
         let (u, v) = match point.normal == Vec3::ZERO {
@@ -332,7 +336,7 @@ impl Rays<'_> {
                 // cosine-weighted: the mean of radiance is irradiance over π (Malley's method)
                 false => (u * cos + v * sin) * y.sqrt() + point.normal * (1.0 - y).sqrt(),
             };
-            let hit = self.occluders.nearest(point.position, ray, f32::INFINITY);
+            let hit = reflecting.nearest(point.position, ray, f32::INFINITY);
             let Some(hit) = hit.filter(|hit| !hit.sky && hit.front) else {
                 continue;
             };

@@ -9,6 +9,7 @@
 //! * surfaces with `deformVertexes autosprite` are one point light;
 //! * a sky light is a set of suns, which are closer to each other near the zenith;
 //! * light passes `surfaceparm trans` without `alphashadow`, liquids among them;
+//! * curves cast no shadow ([`RelitWorld::shadowless_curves`]);
 //! * points have no extent, and light of less than one stored step is left out ([`RelitWorld::light_cutoff`]), of
 //!   points alone ([`RelitWorld::has_compiled_lights`]).
 //!
@@ -84,6 +85,7 @@ impl RelitWorld {
             };
         }
         (self.light_cutoff, self.has_compiled_lights) = (STEP, true);
+        self.shadowless_curves = true;
         self.report.fallback = false;
         self.report.triangle_lights = self.lights.len();
         self.report.point_lights = self.point_lights.len();

@@ -2,7 +2,7 @@
 
 use super::{CutOut, Occluders};
 use crate::materials::light::SurfaceClass;
-use crate::world::{RelitWorld, WorldMaterial};
+use crate::world::{RelitWorld, WorldMaterial, WorldSurface};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -10,9 +10,19 @@ impl Occluders {
     /// Triangles of the world model that stop light: opaque ones, and cut-outs with their holes where these are
     /// known. The tag is the triangle's index.
     pub(crate) fn of_world(world: &RelitWorld) -> Occluders {
+        Occluders::of_surfaces(world, |_| true)
+    }
+
+    /// Those of [`of_world`](Self::of_world) that cast shadows of lamps and suns.
+    pub(crate) fn that_shadow(world: &RelitWorld) -> Occluders {
+        Occluders::of_surfaces(world, |surface| world.casts_shadow(surface))
+    }
+
+    fn of_surfaces(world: &RelitWorld, wanted: impl Fn(&WorldSurface) -> bool) -> Occluders {
         let drawn = world.surfaces.iter().filter(|s| {
             let material = world.materials.get(s.material as usize);
-            s.model == 0 && material.is_some_and(|m| m.is_sky() || stops_light(m))
+            let stops = material.is_some_and(|m| m.is_sky() || stops_light(m));
+            s.model == 0 && stops && wanted(s)
         });
         let mut holes_of = HashMap::new();
         for surface in &world.surfaces {

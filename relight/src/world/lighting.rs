@@ -28,6 +28,7 @@ pub struct Lighting {
     stored_gamma: f32,
     light_cutoff: f32,
     has_compiled_lights: bool,
+    shadowless_curves: bool,
     exposure: Option<Exposure>,
 }
 
@@ -51,6 +52,7 @@ impl RelitWorld {
             stored_gamma: self.stored_gamma,
             light_cutoff: self.light_cutoff,
             has_compiled_lights: self.has_compiled_lights,
+            shadowless_curves: self.shadowless_curves,
             exposure: self.exposure,
         }
     }
@@ -78,6 +80,7 @@ impl RelitWorld {
         self.stored_gamma = lighting.stored_gamma;
         self.light_cutoff = lighting.light_cutoff;
         self.has_compiled_lights = lighting.has_compiled_lights;
+        self.shadowless_curves = lighting.shadowless_curves;
         self.exposure = lighting.exposure;
     }
 

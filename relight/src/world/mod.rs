@@ -24,7 +24,7 @@ use crate::exposure::{self, Exposure};
 use crate::materials::by_hand::MaterialsByHand;
 use crate::overbright;
 use glam::Vec3;
-use q3bsp::{Bsp, Lightmap};
+use q3bsp::{Bsp, Lightmap, SurfaceKind};
 use support::slice::{self, item, part, part_mut, span};
 
 /// A map prepared for tracing and rasterization.
@@ -92,6 +92,9 @@ pub struct RelitWorld {
     /// Whether the lights are [those of a compiler](Self::take_compiled_lights): the cutoff applies to points alone, and a
     /// single ray to a triangle goes to the middle of its bounds.
     pub has_compiled_lights: bool,
+    /// Whether curves cast no shadow of lamps and suns, as with a compiler's lights: q3map2 lets them cast shadows with
+    /// `-patchshadows` alone. They reflect light in any case.
+    pub shadowless_curves: bool,
     /// Exposure at which the world's light on the map's textures has the mean brightness of the engine's picture:
     /// found by [calibration](crate::calibrate()). `None`: see [`display_exposure`](Self::display_exposure).
     pub exposure: Option<Exposure>,
@@ -126,6 +129,19 @@ impl RelitWorld {
                 .flat_map(|&texel| overbright::shift(texel, shift))
                 .collect(),
         )
+    }
+
+    /// Whether a surface of the map itself stops the light of lamps and suns, if its material does.
+    pub fn casts_shadow(&self, surface: &WorldSurface) -> bool {
+        !(self.shadowless_curves && surface.kind == SurfaceKind::Patch)
+    }
+
+    /// Whether any surface [casts no shadow](Self::casts_shadow).
+    pub fn has_shadowless(&self) -> bool {
+        !self
+            .surfaces
+            .iter()
+            .all(|surface| self.casts_shadow(surface))
     }
 
     /// The material of a surface.
