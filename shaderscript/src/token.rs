@@ -67,12 +67,15 @@ struct Bytes<'a> {
     newline: bool,
     /// Where a comment starts that the text ends in.
     unclosed: Option<Position>,
+    /// Line feeds passed so far: a carriage return alone is none.
+    line_feeds: u32,
 }
 
 impl<'a> Bytes<'a> {
     fn advance(&mut self) -> Option<u8> {
         let (&byte, rest) = self.rest.split_first()?;
         self.rest = rest;
+        self.line_feeds = self.line_feeds.saturating_add(u32::from(byte == b'\n'));
         let ends_line = byte == b'\n' || (byte == b'\r' && rest.first() != Some(&b'\n'));
         if ends_line {
             self.position.line = self.position.line.saturating_add(1);
@@ -173,6 +176,7 @@ impl<'a> Lexer<'a> {
                 quoted: false,
                 newline: false,
                 unclosed: None,
+                line_feeds: 0,
             },
             fresh_line: true,
         }
@@ -181,6 +185,11 @@ impl<'a> Lexer<'a> {
     /// Where the next byte stands.
     pub fn position(&self) -> Position {
         self.bytes.position
+    }
+
+    /// Line feeds before the next byte, for readers to whom a carriage return alone ends no line.
+    pub(crate) fn line_feeds(&self) -> u32 {
+        self.bytes.line_feeds
     }
 
     /// Number of bytes of the text that are not read yet.

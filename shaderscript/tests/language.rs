@@ -494,6 +494,19 @@ fn directives_of_other_programs() {
 }
 
 #[test]
+fn directives_behind_others_on_a_line_have_no_effect() {
+    let value = |body: &str| shader(body).light.surface_light;
+    // a carriage return alone ends no line
+    let behind = "surfaceparm nomarks\r q3map_surfacelight 15000\n";
+    assert_eq!(value(&format!("{behind}{STAGE}")), None);
+    assert_eq!(value(&format!("{STAGE} q3map_surfacelight 15000\n")), None);
+    let own = "surfaceparm nomarks\r\nq3map_surfacelight 15000 q3map_lightimage a\n";
+    let own = shader(&format!("{own}{STAGE}"));
+    assert_eq!(own.light.surface_light, Some(15_000.0));
+    assert_eq!(own.light.light_image, None);
+}
+
+#[test]
 fn suns() {
     let sky =
         shader("skyParms - 512 -\nq3map_sun 2 1 0 100 90 0\nq3map_sunExt 1 1 1 50 0 30 2.5 16");

@@ -161,8 +161,12 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
         let mut stages_seen = 0_usize;
         // A stage without an image ends the list that is drawn.
         let mut list_ended = false;
+        // Line feeds before the last keyword or brace; what follows the opening brace begins a line for compilers.
+        let mut before = None;
         loop {
             let token = self.lexer.token().ok_or_else(missing_brace)?;
+            let feeds = Some(self.lexer.line_feeds());
+            let starts_line = std::mem::replace(&mut before, feeds) != feeds;
             self.at = token.position;
             if token.text.starts_with('}') {
                 self.depth = 0;
@@ -177,6 +181,7 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
                 self.depth = 2;
                 let stage = self.stage()?;
                 self.depth = 1;
+                before = Some(self.lexer.line_feeds());
                 match stage {
                     Some(stage) if !list_ended => self.take(stage),
                     Some(_) => {}
@@ -188,7 +193,7 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
                 }
                 continue;
             }
-            self.keyword(&token)?;
+            self.keyword(&token, starts_line)?;
         }
         if stages_seen == 0
             && self.shader.sky.is_none()
@@ -231,10 +236,10 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
         }
     }
 
-    fn keyword(&mut self, token: &Token) -> Result<(), Rejection> {
+    fn keyword(&mut self, token: &Token, starts_line: bool) -> Result<(), Rejection> {
         // The order of the first three tests is the engine's.
         if has_prefix(&token.text, "qer") {
-            self.directive(token);
+            self.directive(token, starts_line);
             return Ok(());
         }
         if token.is("q3map_sun") || token.is("q3map_sunExt") {
@@ -242,7 +247,7 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
             return Ok(());
         }
         if has_prefix(&token.text, "q3map") {
-            self.directive(token);
+            self.directive(token, starts_line);
             return Ok(());
         }
         match token.text.to_ascii_lowercase().as_str() {
@@ -496,9 +501,13 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
         self.remember(keyword, arguments);
     }
 
-    /// A line for another program.
-    fn directive(&mut self, keyword: &Token) {
+    /// A line for another program. Map compilers read one directive a line and pass what follows it.
+    fn directive(&mut self, keyword: &Token, starts_line: bool) {
         let arguments = words(&self.lexer.rest_of_line());
+        if !starts_line {
+            self.remember(keyword, arguments);
+            return;
+        }
         let light = &mut self.shader.light;
         let mut not_a_number = None;
         let mut read = |i: usize| {
@@ -570,7 +579,7 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
                     if token.is("q3map_sun") || token.is("q3map_sunExt") {
                         self.sun(&token);
                     } else if has_prefix(&token.text, "q3map") || has_prefix(&token.text, "qer") {
-                        self.directive(&token);
+                        self.directive(&token, true);
                     }
                 }
             }
