@@ -57,10 +57,10 @@ fn points(world: &RelitWorld, count: usize) -> Vec<Point> {
             let position = (a + b + c) / 3.0 + normal;
             // points in solid leafs have the list of all lights
             let is_open = world.bsp.cluster_at(position) >= 0;
-            is_open.then_some(Point {
+            is_open.then_some(Point::new(
                 position,
-                normal: if number % 8 == 7 { Vec3::ZERO } else { normal },
-            })
+                if number % 8 == 7 { Vec3::ZERO } else { normal },
+            ))
         })
         .collect()
 }
@@ -188,10 +188,7 @@ fn grid_points(world: &RelitWorld, step: usize) -> Vec<Point> {
     let all = (0..layout.points()).step_by(step);
     all.map(|i| layout.position(i % nx, i / nx % ny, i / nx / ny))
         .filter(|at| world.bsp.cluster_at(*at) >= 0)
-        .map(|position| Point {
-            position,
-            normal: Vec3::ZERO,
-        })
+        .map(|position| Point::new(position, Vec3::ZERO))
         .collect()
 }
 

@@ -59,10 +59,7 @@ impl FreeSpace<'_> {
             // off the plane of the wall, which a ray that starts in it may meet
             (count > 0).then(|| free.sum::<Vec3>() / count as f32)
         })?;
-        Some(Point {
-            position,
-            normal: place.normal,
-        })
+        Some(Point::new(position, place.normal))
     }
 
     /// Whether q3map2 takes a position for free: it tests the brushes of the position's own leaf alone, so that a

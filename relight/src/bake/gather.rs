@@ -10,6 +10,20 @@ pub struct Point {
     pub position: Vec3,
     /// Unit normal of the surface. Zero for a point of the light grid: light from each direction counts fully.
     pub normal: Vec3,
+    /// Its number among points whose mean is wanted, counted from 0: these follow one another in a list, and divide the
+    /// area of each light among their shadow rays.
+    pub rank: u32,
+}
+
+impl Point {
+    /// A point of its own.
+    pub fn new(position: Vec3, normal: Vec3) -> Point {
+        Point {
+            position,
+            normal,
+            rank: 0,
+        }
+    }
 }
 
 /// Light at a point.

@@ -75,10 +75,7 @@ pub(super) fn bake(
     let everywhere: Vec<Point> = free
         .iter()
         .flatten()
-        .map(|&position| Point {
-            position,
-            normal: Vec3::ZERO,
-        })
+        .map(|&position| Point::new(position, Vec3::ZERO))
         .collect();
     let all = gather.direct(&everywhere, samples, &mut |part| progress(part * 0.5))?;
     let facing: Vec<Point> = everywhere

@@ -11,7 +11,7 @@ use glam::{Vec2, Vec3};
 use std::collections::HashMap;
 use std::f32::consts::{PI, TAU};
 use support::parallel;
-use support::random::Random;
+use support::random::{Pairs, Random};
 use support::slice;
 
 /// Points that one task computes: neighbours share the triangles that shadow them.
@@ -83,33 +83,66 @@ impl Hints {
     }
 }
 
+/// Where the shadow rays of one point to one light end: points whose mean is wanted take other strata of the light.
+struct Strata {
+    places: Pairs,
+    rank: u32,
+}
+
+impl Strata {
+    /// `first`: the number of the first of the points whose mean is wanted; `light`: unique for each light.
+    fn new(first: usize, light: u32, rank: u32) -> Strata {
+        let own = (first as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        Strata {
+            places: Pairs::new(own ^ u64::from(light)),
+            rank,
+        }
+    }
+
+    /// In the unit square. Rays from the number `rays` on replace others.
+    fn place(&self, ray: u32, rays: u32) -> [f32; 2] {
+        let (turn, ray) = (ray / rays.max(1), ray % rays.max(1));
+        let within = self.rank.wrapping_mul(rays).wrapping_add(ray);
+        self.places.at(within ^ turn << 24)
+    }
+
+    /// In the disc of radius 1.
+    fn in_disc(&self, ray: u32, rays: u32) -> [f32; 2] {
+        let [x, y] = self.place(ray, rays);
+        let (sin, cos) = (y * TAU).sin_cos();
+        [cos, sin].map(|along| along * x.sqrt())
+    }
+}
+
 impl Rays<'_> {
     fn direct_at(&self, point: &Point, samples: u32, number: usize, hints: &mut Hints) -> Light {
         let world = self.world;
         let cluster = world.bsp.cluster_at(point.position);
         let row = world.light_lists.row(cluster);
         hints.enter(cluster, row.len());
-        let mut random = Random::new(0xBA4E_0000 + number as u64);
+        let first = number.saturating_sub(point.rank as usize);
         let mut sum = Light::default();
         for (place, light) in self.unshadowed(point, row) {
             let hint = slice::get_mut(&mut hints.leaves, place);
             let mut none = None;
             let hint = hint.unwrap_or(&mut none);
+            let strata = Strata::new(first, light.entry, point.rank);
             let (part, towards) = match world.light_lists.light(light.entry) {
                 LightRef::Triangle(index) => match world.lights.get(index as usize) {
-                    Some(light) => self.part_of_triangle(point, light, samples, hint, &mut random),
+                    Some(light) => self.part_of_triangle(point, light, samples, hint, &strata),
                     None => continue,
                 },
                 LightRef::Point(index) => match world.point_lights.get(index as usize) {
-                    Some(light) => self.part_of_point(point, light, samples, hint, &mut random),
+                    Some(light) => self.part_of_point(point, light, samples, hint, &strata),
                     None => continue,
                 },
             };
             add(&mut sum, light.value * part, towards);
         }
         if world.light_lists.sees_sky(cluster) {
-            for sun in &world.suns {
-                self.add_sun(point, sun, samples, &mut random, &mut sum);
+            for (sun, key) in world.suns.iter().zip(0u32..) {
+                let strata = Strata::new(first, !key, point.rank);
+                self.add_sun(point, sun, samples, &strata, &mut sum);
             }
             if self.has_sky_lights {
                 self.add_sky(point, samples, &mut sum);
@@ -189,7 +222,7 @@ impl Rays<'_> {
         light: &TriangleLight,
         samples: u32,
         hint: &mut Option<u32>,
-        random: &mut Random,
+        strata: &Strata,
     ) -> (f32, Vec3) {
         let [a, b, c] = light.vertices;
         let middle = (a + b + c) / 3.0;
@@ -215,9 +248,10 @@ impl Rays<'_> {
             (samples, true) => samples.saturating_mul(WIDE_RAYS),
         };
         let (mut sent, mut open) = (0u32, 0u32);
-        for _ in 0..rays.saturating_mul(3) {
-            let (u, v) = random.in_triangle();
-            let to = a + (b - a) * u + (c - a) * v;
+        for ray in 0..rays.saturating_mul(3) {
+            let [x, y] = strata.place(ray, rays);
+            let from_a = x.sqrt();
+            let to = a + ((b - a) * (1.0 - y) + (c - a) * y) * from_a;
             if !above(to) {
                 continue;
             }
@@ -237,7 +271,7 @@ impl Rays<'_> {
         light: &PointLight,
         samples: u32,
         hint: &mut Option<u32>,
-        random: &mut Random,
+        strata: &Strata,
     ) -> (f32, Vec3) {
         let towards = (light.origin - point.position).normalize_or_zero();
         let rays = if light.radius > 0.0 {
@@ -245,11 +279,16 @@ impl Rays<'_> {
         } else {
             1
         };
+        // the sphere seen from the point is a disc
+        let (u, v) = towards.any_orthonormal_pair();
         let mut open = 0;
-        for _ in 0..rays {
+        for ray in 0..rays {
             let to = match samples {
                 0 => light.origin,
-                _ => light.origin + random.signed_point().clamp_length_max(1.0) * light.radius,
+                _ => {
+                    let [x, y] = strata.in_disc(ray, rays);
+                    light.origin + (u * x + v * y) * light.radius
+                }
             };
             open += u32::from(!self.occluders.blocked_hinted(point.position, to, hint));
         }
@@ -261,19 +300,18 @@ impl Rays<'_> {
         point: &Point,
         sun: &SunLight,
         samples: u32,
-        random: &mut Random,
+        strata: &Strata,
         sum: &mut Light,
     ) {
         let (u, v) = sun.direction.any_orthonormal_pair();
         let radius = sun.angular_radius.tan();
         let rays = samples.max(1);
-        for _ in 0..rays {
+        for ray in 0..rays {
             let direction = match samples {
                 0 => sun.direction,
                 _ => {
-                    let (sin, cos) = (random.uniform() * TAU).sin_cos();
-                    let aside = radius * random.uniform().sqrt();
-                    (sun.direction + (u * cos + v * sin) * aside).normalize_or(sun.direction)
+                    let [x, y] = strata.in_disc(ray, rays);
+                    (sun.direction + (u * x + v * y) * radius).normalize_or(sun.direction)
                 }
             };
             let cosine = cosine(point, direction);

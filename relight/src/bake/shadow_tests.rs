@@ -48,7 +48,7 @@ fn floor_points() -> Vec<(Point, bool)> {
             let [low, high] = CORNERS.map(Vec2::from);
             let depth = (across - low).min(high - across).min_element();
             let normal = Vec3::Z;
-            (depth.abs() > 0.5).then_some((Point { position, normal }, depth > 0.0))
+            (depth.abs() > 0.5).then_some((Point::new(position, normal), depth > 0.0))
         })
         .collect()
 }

@@ -165,8 +165,10 @@ impl Targets {
                         points: start..start,
                     });
                 }
-                self.points.extend(point);
                 if let Some(texel) = texels.last_mut() {
+                    let rank = texel.points.len() as u32;
+                    self.points
+                        .extend(point.map(|point| Point { rank, ..point }));
                     texel.points.end = self.points.len() as u32;
                 }
             }
@@ -296,10 +298,7 @@ impl<'a> FreeSpace<'a> {
         let to_middle = place.middle - place.position;
         let moved = |step: f32| place.position + to_middle.clamp_length_max(step);
         let places = std::iter::once(place.position).chain(MOVES.map(moved));
-        let mut points = places.map(|on| Point {
-            position: on + lift,
-            normal,
-        });
+        let mut points = places.map(|on| Point::new(on + lift, normal));
         match surface.model {
             0 => points.find(|point| self.has(point.position)),
             // the leafs of the map say nothing about brush models

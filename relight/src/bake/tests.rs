@@ -177,15 +177,34 @@ fn a_box_casts_a_shadow() {
     assert!(dark > 500 && lit > 5000, "{dark} {lit}");
 }
 
+/// Height and half a side of a square lamp.
+const LAMP: (f32, f32) = (200.0, 50.0);
+
+fn lamp(map: &mut MapBuilder) {
+    let (z, half) = LAMP;
+    let lamp = map.add_shader("t/lamp", 0, 1);
+    // clockwise seen from below
+    let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+    map.add_quad(lamp, corners.map(|(x, y)| Vec3::new(x * half, y * half, z)));
+}
+
+/// A room whose lamp has an edge along y below its middle.
+fn half_shaded() -> RelitWorld {
+    world(&room(&[], |map| {
+        lamp(map);
+        let wall = map.add_shader("t/wall", 0, 1);
+        map.add_box_faces(
+            wall,
+            Vec3::new(-200.0, -250.0, 100.0),
+            Vec3::new(0.0, 250.0, 104.0),
+            false,
+        );
+    }))
+}
+
 #[test]
 fn a_lamp_gives_the_integral_over_its_area_and_soft_shadows() {
-    let (z, half) = (200.0, 50.0);
-    let lamp = |map: &mut MapBuilder| {
-        let lamp = map.add_shader("t/lamp", 0, 1);
-        // clockwise seen from below
-        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-        map.add_quad(lamp, corners.map(|(x, y)| Vec3::new(x * half, y * half, z)));
-    };
+    let (z, half) = LAMP;
     let open = world(&room(&[], lamp));
     let light = baked(&open, &plain(&open));
     for (at, light) in floor(&open, &light).iter().step_by(97) {
@@ -207,17 +226,7 @@ fn a_lamp_gives_the_integral_over_its_area_and_soft_shadows() {
             light.value
         );
     }
-    // half of the lamp is behind an edge that stands below its middle
-    let shaded = world(&room(&[], |map| {
-        lamp(map);
-        let wall = map.add_shader("t/wall", 0, 1);
-        map.add_box_faces(
-            wall,
-            Vec3::new(-200.0, -250.0, 100.0),
-            Vec3::new(0.0, 250.0, 104.0),
-            false,
-        );
-    }));
+    let shaded = half_shaded();
     let soft = BakeOptions {
         samples: 64,
         ..plain(&shaded)
@@ -233,6 +242,32 @@ fn a_lamp_gives_the_integral_over_its_area_and_soft_shadows() {
     };
     let part = below(&soft, &shaded) / below(&light, &open);
     assert!((part - 0.5).abs() < 0.05, "{part}");
+}
+
+#[test]
+fn points_of_a_texel_divide_a_lamp_among_their_rays() {
+    let world = half_shaded();
+    let of = |pattern, samples| {
+        let options = BakeOptions {
+            pattern,
+            samples,
+            ..plain(&world)
+        };
+        floor(&world, &baked(&world, &options))
+    };
+    let (fine, exact) = (of(2, 4), of(2, 256));
+    // texels below the edge, where about half of the lamp is seen
+    let mut parts = Vec::new();
+    for ((at, light), (_, exact)) in fine.iter().zip(&exact) {
+        if at.x.abs() < 15.0 && at.y.abs() < 120.0 {
+            parts.push(light.value.x / exact.value.x);
+        }
+    }
+    let count = parts.len() as f32;
+    let mean = parts.iter().sum::<f32>() / count;
+    let deviation = (parts.iter().map(|p| (p - mean).powi(2)).sum::<f32>() / count).sqrt();
+    assert!((mean - 1.0).abs() < 0.01, "{mean}");
+    assert!(deviation < 0.1, "{deviation}");
 }
 
 #[test]
@@ -279,10 +314,7 @@ fn surfaces_reflect_their_part_of_even_light() {
         light: &[Vec3::splat(3.0)],
     };
     for normal in [Vec3::Z, Vec3::ZERO] {
-        let point = Point {
-            position: Vec3::new(10.0, 20.0, 30.0),
-            normal,
-        };
+        let point = Point::new(Vec3::new(10.0, 20.0, 30.0), normal);
         let found = rays.reflected(&[point], lit, 64, &mut |_| ()).unwrap();
         // over all directions, fluence over π is 4 times the radiance
         let whole = if normal == Vec3::ZERO { 4.0 } else { 1.0 };

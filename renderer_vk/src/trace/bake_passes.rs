@@ -143,6 +143,7 @@ impl Chunk {
                 Some(point) => t::BakePoint {
                     position: point.position,
                     normal: point.normal,
+                    rank: point.rank,
                 },
                 None => t::BakePoint::default(),
             })

@@ -11,6 +11,8 @@ pub struct BakePoint {
     pub position: Vec3,
     /// Unit normal; zero: light from each direction counts fully.
     pub normal: Vec3,
+    /// Its number among points that follow one another and whose mean is wanted.
+    pub rank: u32,
 }
 
 /// Light at a point.

@@ -508,10 +508,7 @@ fn rays_give_what_q3map2_stores_of_points() {
             ("light", light),
         ]);
         let world = compiled(map);
-        let point = Point {
-            position: Vec3::NEG_Z * height,
-            normal: Vec3::Z,
-        };
+        let point = Point::new(Vec3::NEG_Z * height, Vec3::Z);
         let found = Rays::new(&world).direct(&[point], 0, &mut |_| ());
         found.unwrap()[0].value.x * 255.0 / 4.0
     };

@@ -32,10 +32,7 @@ gpu_tests! {
 }
 
 fn on_floor(x: f32, y: f32) -> Point {
-    Point {
-        position: Vec3::new(x, y, 0.1),
-        normal: Vec3::Z,
-    }
+    Point::new(Vec3::new(x, y, 0.1), Vec3::Z)
 }
 
 /// A scene seen from nowhere.
@@ -175,10 +172,7 @@ fn triangles_have_the_form_factor_of_a_rectangle(gpu: &mut Gpu) {
             assert!(light.towards.x > 0.0 && light.towards.y > 0.0 && light.towards.z > 0.0);
         }
         // from behind
-        let above = Point {
-            position: Vec3::new(0.0, 0.0, height + 50.0),
-            normal: Vec3::NEG_Z,
-        };
+        let above = Point::new(Vec3::new(0.0, 0.0, height + 50.0), Vec3::NEG_Z);
         assert_eq!(direct(gpu, &scene, &[above], 4)[0], Light::default());
     }
 }
@@ -388,10 +382,7 @@ fn the_part_of_a_triangle_above_the_horizon_counts(gpu: &mut Gpu) {
             Vec3::X,
             Vec3::new(-0.1, 0.2, 1.0),
         ] {
-            let point = Point {
-                position: Vec3::ZERO,
-                normal: normal.normalize(),
-            };
+            let point = Point::new(Vec3::ZERO, normal.normalize());
             let exact = integrated(point, triangle);
             for samples in [0, 8] {
                 let found = direct(gpu, &scene, &[point], samples)[0];
@@ -405,10 +396,7 @@ fn the_part_of_a_triangle_above_the_horizon_counts(gpu: &mut Gpu) {
 }
 
 fn points_without_surface_have_no_cosine(gpu: &mut Gpu) {
-    let free = Point {
-        position: Vec3::new(3.0, 4.0, 20.0),
-        normal: Vec3::ZERO,
-    };
+    let free = Point::new(Vec3::new(3.0, 4.0, 20.0), Vec3::ZERO);
     let mut scene = scene();
     scene.point(Vec3::new(3.0, 104.0, 20.0), 1000.0, 4.0);
     let found = direct(gpu, &scene, &[free], 16)[0];
@@ -416,10 +404,7 @@ fn points_without_surface_have_no_cosine(gpu: &mut Gpu) {
     // the plane of a floor that a point of the grid lies in hides nothing above it
     let mut scene = floor();
     scene.point(Vec3::new(3.0, 4.0, 100.0), 1000.0, 4.0);
-    let on_plane = Point {
-        position: Vec3::new(3.0, 4.0, 0.0),
-        normal: Vec3::ZERO,
-    };
+    let on_plane = Point::new(Vec3::new(3.0, 4.0, 0.0), Vec3::ZERO);
     let found = direct(gpu, &scene, &[on_plane], 16)[0];
     assert_near(found.value.x, 1000.0 / 100.0f32.powi(2) / PI, 1e-4);
     let mut scene = self::scene();
@@ -462,18 +447,12 @@ fn a_closed_box_reflects_its_reflectance(gpu: &mut Gpu) {
         reflectances: &reflectances,
         light: &[Vec3::new(2.0, 4.0, 3.0)],
     };
-    let wall = |x: f32| Point {
-        position: Vec3::new(x, 13.0, 20.0),
-        normal: -Vec3::X * x.signum(),
-    };
+    let wall = |x: f32| Point::new(Vec3::new(x, 13.0, 20.0), -Vec3::X * x.signum());
     let free = Point {
         normal: Vec3::ZERO,
         ..wall(30.0)
     };
-    let outside = Point {
-        position: Vec3::new(300.0, 0.0, 0.0),
-        normal: Vec3::NEG_X,
-    };
+    let outside = Point::new(Vec3::new(300.0, 0.0, 0.0), Vec3::NEG_X);
     let points = [wall(99.9), wall(-99.9), free, outside];
     let found = reflected(gpu, &scene, &points, &lit, 256);
     let exact = Vec3::new(1.0, 1.0, 3.0);
@@ -515,10 +494,7 @@ fn texels_and_vertices_are_found_where_they_are(gpu: &mut Gpu) {
     let light: Vec<Vec3> = (0..69).map(|i| Vec3::splat(i as f32)).collect();
     let by_vertex = |t: usize| LitTriangle::Vertices(corners(t).map(|v| v % 4));
     let reflectances = [Vec3::ONE; 4];
-    let near = |x: f32, y: f32| Point {
-        position: Vec3::new(x, y, 0.05),
-        normal: Vec3::NEG_Z,
-    };
+    let near = |x: f32, y: f32| Point::new(Vec3::new(x, y, 0.05), Vec3::NEG_Z);
     let places: Vec<(usize, usize)> = (0..64).map(|i| (i % 8, i / 8)).collect();
     let points: Vec<Point> = (places.iter())
         .map(|&(x, y)| near(-87.5 + 25.0 * x as f32, -87.5 + 25.0 * y as f32))
