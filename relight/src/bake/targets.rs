@@ -20,6 +20,10 @@ const INSIDE: f32 = -0.5;
 /// Distances by which a point inside of something solid is moved towards the middle of its triangle, id units.
 const MOVES: [f32; 2] = [2.0, 5.0];
 
+/// Distance beside a surface of a brush model at which a point is searched if the surface lies in solid, as those of doors
+/// in their frames do, id units.
+const BESIDE: f32 = 8.0;
+
 /// Places that one task searches.
 const TASK: usize = 1024;
 
@@ -286,8 +290,8 @@ impl<'a> FreeSpace<'a> {
         position.is_finite() && (!self.has_leafs || self.world.bsp.cluster_at(position) >= 0)
     }
 
-    /// The point of a place: above its surface, moved towards the middle of its triangle if that lies in solid. `None` if
-    /// none of these is free.
+    /// The point of a place: above its surface, moved towards the middle of its triangle if that lies in solid, on brush
+    /// models also beside it. `None` if none of these is free.
     fn point(&self, place: &Place) -> Option<Point> {
         let world = self.world;
         let surface = world.surfaces.get(place.surface as usize)?;
@@ -299,10 +303,46 @@ impl<'a> FreeSpace<'a> {
         let moved = |step: f32| place.position + to_middle.clamp_length_max(step);
         let places = std::iter::once(place.position).chain(MOVES.map(moved));
         let mut points = places.map(|on| Point::new(on + lift, normal));
-        match surface.model {
-            0 => points.find(|point| self.has(point.position)),
-            // the leafs of the map say nothing about brush models
-            _ => points.find(|point| point.position.is_finite()),
+        let found = points.find(|point| self.has(point.position));
+        if surface.model == 0 {
+            return found;
         }
+        let (u, v) = normal.any_orthonormal_pair();
+        let mut beside = [u, -u, v, -v]
+            .map(|along| Point::new(place.position + along * BESIDE + lift, normal))
+            .into_iter();
+        found.or_else(|| beside.find(|point| self.has(point.position)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bake::tests::{baked, plain, room, world};
+
+    #[test]
+    fn a_door_in_its_frame_is_lit_from_beside() {
+        // a plate that ends at a step as high as itself
+        let light = [
+            ("classname", "light"),
+            ("origin", "350 0 90"),
+            ("light", "300"),
+        ];
+        let world = world(&room(&[&light], |map| {
+            let wall = map.add_shader("t/wall", 0, 1);
+            let step = Vec3::new(256.0, -256.0, 4.0);
+            map.add_room(wall, step, Vec3::new(512.0, 256.0, 256.0));
+            map.begin_model();
+            let plate = [Vec3::new(100.0, -50.0, 0.0), Vec3::new(256.0, 50.0, 4.0)];
+            for face in map.add_box_faces(wall, plate[0], plate[1], false) {
+                let page = map.add_lightmap([0; 3]);
+                map.set_lightmap(face, page);
+            }
+        }));
+        let end = |s: &&WorldSurface| s.model == 1 && s.plane.is_some_and(|p| p.normal == Vec3::X);
+        let page = world.surfaces.iter().find(end).unwrap().light_page as usize;
+        let baked = baked(&world, &plain(&world));
+        let page = baked.pages.iter().find(|p| p.number == page).unwrap();
+        assert!(page.light.iter().all(|light| light.value.x > 0.0));
     }
 }

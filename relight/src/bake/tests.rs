@@ -89,7 +89,7 @@ pub(super) fn plain_world(bsp: Bsp) -> RelitWorld {
 }
 
 /// Options for one point a texel, one ray to each light and no bounce.
-fn plain(world: &RelitWorld) -> BakeOptions {
+pub(super) fn plain(world: &RelitWorld) -> BakeOptions {
     BakeOptions {
         pattern: 1,
         samples: 0,
@@ -98,7 +98,7 @@ fn plain(world: &RelitWorld) -> BakeOptions {
     }
 }
 
-fn baked(world: &RelitWorld, options: &BakeOptions) -> Baked {
+pub(super) fn baked(world: &RelitWorld, options: &BakeOptions) -> Baked {
     bake(world, &mut Rays::new(world), options, &mut |_, _| ()).unwrap()
 }
 
@@ -255,7 +255,7 @@ fn points_of_a_texel_divide_a_lamp_among_their_rays() {
         };
         floor(&world, &baked(&world, &options))
     };
-    let (fine, exact) = (of(2, 4), of(2, 256));
+    let (fine, exact) = (of(2, 4), of(1, 64));
     // texels below the edge, where about half of the lamp is seen
     let mut parts = Vec::new();
     for ((at, light), (_, exact)) in fine.iter().zip(&exact) {
@@ -266,8 +266,10 @@ fn points_of_a_texel_divide_a_lamp_among_their_rays() {
     let count = parts.len() as f32;
     let mean = parts.iter().sum::<f32>() / count;
     let deviation = (parts.iter().map(|p| (p - mean).powi(2)).sum::<f32>() / count).sqrt();
-    assert!((mean - 1.0).abs() < 0.01, "{mean}");
-    assert!(deviation < 0.1, "{deviation}");
+    assert!(
+        (mean - 1.0).abs() < 0.01 && deviation < 0.1,
+        "{mean} {deviation}"
+    );
 }
 
 #[test]
