@@ -10,6 +10,7 @@
 
 use std::collections::HashMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::Vec3;
 use shaders::trace_types::{BvhNode, BvhTriangle};
@@ -41,7 +42,7 @@ pub struct AnimatedShape {
     pub seen: u64,
     /// Changes whenever the triangles change.
     version: u64,
-    indices: Vec<[u32; 3]>,
+    indices: Arc<[[u32; 3]]>,
     /// The triangles as build input of the driver; `None` for our own hierarchies.
     index_buffer: Option<Buffer>,
     /// One for each part of this shape in a view.
@@ -82,20 +83,26 @@ enum PoseBottom {
         /// Geometry to be built in this frame; `true`: by a refit.
         pending: Option<([BlasGeometry; 1], bool)>,
     },
-    Own {
-        hierarchy: Hierarchy,
-        /// Expected ray cost at the last build.
-        cost: f32,
-        bottom: Option<OwnBottom>,
-        /// Nodes and triangles of `bottom`, if they last longer than a frame.
-        kept: Option<Buffer>,
-        /// What it is to be fitted to in this frame.
-        due: Option<Due>,
-    },
+    Own(OwnPose),
+}
+
+/// A hierarchy of ours.
+#[derive(Default)]
+struct OwnPose {
+    hierarchy: Hierarchy,
+    /// Expected ray cost at the last build.
+    cost: f32,
+    bottom: Option<OwnBottom>,
+    /// Nodes and triangles of `bottom`, if they last longer than a frame.
+    kept: Option<Buffer>,
+    /// What it is to be fitted to in this frame.
+    due: Option<Due>,
 }
 
 /// What a hierarchy of ours is to be fitted to.
 struct Due {
+    /// The shape's triangles when it was taken: another entity of this view may replace them.
+    indices: Arc<[[u32; 3]]>,
     /// The vertices of the view.
     vertices: Range<usize>,
     /// Whether it lasts longer than a frame.
@@ -104,11 +111,7 @@ struct Due {
 
 /// A hierarchy of ours that is to be fitted.
 pub struct Fit<'a> {
-    indices: &'a [[u32; 3]],
-    hierarchy: &'a mut Hierarchy,
-    cost: &'a mut f32,
-    bottom: &'a mut Option<OwnBottom>,
-    kept: &'a mut Option<Buffer>,
+    pose: &'a mut OwnPose,
     due: Due,
     fitted: Option<Fitted>,
 }
@@ -125,11 +128,14 @@ impl Fit<'_> {
     pub fn compute(&mut self, all: &[Vertex]) {
         let vertices = slice::part(all, self.due.vertices.clone());
         let position = |i: u32| vertices.get(i as usize).map_or(Vec3::NAN, |v| v.position);
-        let corners: Vec<[Vec3; 3]> = self.indices.iter().map(|t| t.map(position)).collect();
+        let corners: Vec<[Vec3; 3]> = self.due.indices.iter().map(|t| t.map(position)).collect();
         let boxes: Vec<Aabb> = corners.iter().map(|&c| Aabb::of(c)).collect();
-        self.fitted = fit(self.hierarchy, self.cost, &boxes).map(|bounds| Fitted {
-            nodes: widen(self.hierarchy),
-            triangles: ordered(self.hierarchy, &corners),
+        let OwnPose {
+            hierarchy, cost, ..
+        } = &mut *self.pose;
+        self.fitted = fit(hierarchy, cost, &boxes).map(|bounds| Fitted {
+            nodes: widen(hierarchy),
+            triangles: ordered(hierarchy, &corners),
             bounds,
         });
     }
@@ -139,7 +145,7 @@ impl Fit<'_> {
     /// # Errors
     /// Out of memory.
     pub fn store(self, rec: &mut Recorder, device: &Device) -> Result<(), Error> {
-        (*self.bottom, *self.kept) = (None, None);
+        (self.pose.bottom, self.pose.kept) = (None, None);
         let Some(fitted) = self.fitted else {
             return Ok(()); // without a triangle
         };
@@ -151,7 +157,7 @@ impl Fit<'_> {
             let (name, storage) = ("trace animated kept", BufferUsage::STORAGE);
             let buffer = Buffer::with_data(device, name, storage, &bytes.concat())?;
             let address = buffer.address();
-            *self.kept = Some(buffer);
+            self.pose.kept = Some(buffer);
             [
                 address,
                 address + size_of_val(fitted.nodes.as_slice()) as u64,
@@ -160,7 +166,7 @@ impl Fit<'_> {
             let arena = rec.arena();
             [arena.push(&fitted.nodes)?, arena.push(&fitted.triangles)?]
         };
-        *self.bottom = Some(OwnBottom {
+        self.pose.bottom = Some(OwnBottom {
             nodes,
             triangles,
             bounds: fitted.bounds,
@@ -198,7 +204,7 @@ impl AnimatedShape {
         Ok(Self {
             seen: 0,
             version,
-            indices,
+            indices: indices.into(),
             index_buffer,
             poses,
             taken,
@@ -259,7 +265,7 @@ impl AnimatedShape {
         };
         match &pose?.bottom {
             PoseBottom::Driver { blas, .. } => Some(Bottom::Driver(blas.address())),
-            PoseBottom::Own { bottom, .. } => bottom.map(Bottom::Own),
+            PoseBottom::Own(own) => own.bottom.map(Bottom::Own),
         }
     }
 
@@ -305,22 +311,10 @@ impl AnimatedShape {
 
     /// Hierarchies of ours that are to be fitted in this frame.
     pub fn due(&mut self) -> impl Iterator<Item = Fit<'_>> {
-        let (poses, indices) = (&mut self.poses, self.indices.as_slice());
-        let all = poses.iter_mut().chain(self.of_bodies.values_mut());
-        all.filter_map(move |pose| match &mut pose.bottom {
-            PoseBottom::Own {
-                hierarchy,
-                cost,
-                bottom,
-                kept,
-                due,
-            } => Some(Fit {
-                due: due.take()?,
-                indices,
-                hierarchy,
-                cost,
-                bottom,
-                kept,
+        self.all_mut().filter_map(|pose| match &mut pose.bottom {
+            PoseBottom::Own(own) => Some(Fit {
+                due: own.due.take()?,
+                pose: own,
                 fitted: None,
             }),
             PoseBottom::Driver { .. } => None,
@@ -395,8 +389,9 @@ impl AnimatedShape {
                 let geometry = geometry(kind, address, vertices.len(), at, self.indices.len());
                 *pending = Some(([geometry], refit));
             }
-            PoseBottom::Own { due, .. } => {
-                *due = Some(Due {
+            PoseBottom::Own(own) => {
+                own.due = Some(Due {
+                    indices: Arc::clone(&self.indices),
                     vertices: range,
                     lasts: omitted.is_some(),
                 });
@@ -410,13 +405,7 @@ impl Pose {
     /// A pose that is not built. `own`: it has a hierarchy of ours.
     fn new(device: &Device, own: bool) -> Self {
         let bottom = if own {
-            PoseBottom::Own {
-                hierarchy: Hierarchy::default(),
-                cost: 0.0,
-                bottom: None,
-                kept: None,
-                due: None,
-            }
+            PoseBottom::Own(OwnPose::default())
         } else {
             let flags = BlasFlags {
                 refit: true,
@@ -437,9 +426,9 @@ impl Pose {
     fn size(&self) -> u64 {
         match &self.bottom {
             PoseBottom::Driver { blas, .. } => blas.size(),
-            PoseBottom::Own {
+            PoseBottom::Own(OwnPose {
                 hierarchy, kept, ..
-            } => {
+            }) => {
                 kept.as_ref().map_or(0, Buffer::size)
                     + (hierarchy.node_count() * size_of::<BvhNode>()
                         + hierarchy.order().len() * size_of::<BvhTriangle>())
@@ -452,7 +441,7 @@ impl Pose {
     fn is_kept(&self) -> bool {
         match &self.bottom {
             PoseBottom::Driver { blas, area, .. } => blas.address() != 0 && *area > 0.0,
-            PoseBottom::Own { kept, .. } => kept.is_some(),
+            PoseBottom::Own(own) => own.kept.is_some(),
         }
     }
 
@@ -460,9 +449,7 @@ impl Pose {
     fn forget(&mut self) {
         match &mut self.bottom {
             PoseBottom::Driver { area, .. } => *area = 0.0,
-            PoseBottom::Own {
-                hierarchy, kept, ..
-            } => (*hierarchy, *kept) = (Hierarchy::default(), None),
+            PoseBottom::Own(own) => (own.hierarchy, own.kept) = (Hierarchy::default(), None),
         }
     }
 }

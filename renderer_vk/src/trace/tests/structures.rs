@@ -16,6 +16,7 @@ use crate::trace::tracer::Tracer;
 gpu_tests! {
     each: [
         kept_structures_show_what_built_ones_show,
+        entities_of_one_model_may_have_triangles_of_their_own,
         non_finite_geometry_is_never_hit,
     ],
 }
@@ -176,6 +177,31 @@ fn kept_structures_show_what_built_ones_show(gpu: &mut Gpu) {
     }
     // three models of two kinds, in five poses as rigid ones, each built once
     assert_eq!(gpu.look.accel.counts(), [5 * 3 * 2, 3 * 3]);
+}
+
+fn entities_of_one_model_may_have_triangles_of_their_own(gpu: &mut Gpu) {
+    for frame in 0..2 {
+        let pictures = [How::Changing, How::Animated].map(|how| {
+            let mut scene = stage_scene();
+            let solid = scene.diffuse(0.8);
+            let mut places = Random::new(frame);
+            for half in 0..2 {
+                let (vertices, mut indices) = shards(5, 24);
+                indices.drain(half * 36..half * 36 + 36);
+                let mesh = Arc::new(RigidMesh::new(vertices, indices));
+                let small = turned(&mut places);
+                let large = Instance {
+                    axis: small.axis.map(|side| side * 3.0),
+                    ..small
+                };
+                add(&mut scene, how, &mesh, 1, solid, large);
+            }
+            gpu.render(&scene, &settings(), 1).0
+        });
+        let count = differing(&pictures[0], &pictures[1]);
+        println!("frame {frame}: {count} of {} differ", pictures[0].len());
+        assert!(count < pictures[0].len() / 60, "{frame}: {count}");
+    }
 }
 
 #[test]
