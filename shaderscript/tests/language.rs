@@ -504,6 +504,14 @@ fn directives_behind_others_on_a_line_have_no_effect() {
     let own = shader(&format!("{own}{STAGE}"));
     assert_eq!(own.light.surface_light, Some(15_000.0));
     assert_eq!(own.light.light_image, None);
+    // nor do they where the engine rejects the definition
+    let salvaged = |body: &str| {
+        let script = script(&format!("{STAGE}\nshiny yes\n{body}"));
+        assert!(script.shaders[0].rejected.is_some());
+        script.shaders[0].light.surface_light
+    };
+    assert_eq!(salvaged(behind), None);
+    assert_eq!(salvaged("q3map_surfacelight 15000\n"), Some(15_000.0));
 }
 
 #[test]

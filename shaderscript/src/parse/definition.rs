@@ -563,6 +563,7 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
     /// After a rejection: goes to the end of the definition for its light directives, because the map compiler,
     /// which wrote the lightmaps, did not reject it.
     fn salvage(&mut self) {
+        let mut before = self.lexer.line_feeds();
         while self.depth > 0 {
             let Some(token) = self.lexer.token() else {
                 if self.lexer.at_end() {
@@ -570,10 +571,12 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
                 }
                 continue;
             };
+            let feeds = self.lexer.line_feeds();
+            let starts_line = std::mem::replace(&mut before, feeds) != feeds;
             match token.text.as_str() {
                 "{" => self.depth = self.depth.saturating_add(1),
                 "}" => self.depth -= 1,
-                _ if self.depth > 1 || !token.starts_line => {}
+                _ if self.depth > 1 || !starts_line => {}
                 _ => {
                     self.at = token.position;
                     if token.is("q3map_sun") || token.is("q3map_sunExt") {
