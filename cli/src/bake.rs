@@ -67,7 +67,7 @@ pub struct BakeArgs {
     /// One point a texel, one shadow ray to a light, one bounce: for a first look
     #[arg(long)]
     fast: bool,
-    /// Let curves cast shadows, as the compiler's -patchshadows; those of a finished map do without it
+    /// Let curves cast shadows, as the compiler's -patchshadows; on a finished map they always do
     #[arg(long)]
     patch_shadows: bool,
     /// Gamma of stored light, as the compiler's -gamma; default: 1, or what calibration found

@@ -14,8 +14,8 @@ use q3bsp::SurfaceKind;
 /// Distance from a brush within which a point is in solid, id units.
 const MARGIN: f32 = 0.125;
 
-/// Half side of a square around a point of which a part must be free, id units: points in the plane of a wall count as
-/// free.
+/// Half the side of a square around a point, id units. The point is free if any corner of the square is, as it is for a
+/// point in the plane of a wall.
 const SLACK: f32 = 0.1;
 
 /// Places in a texel, in parts of its half sides, in the order in which they are tried.

@@ -10,8 +10,8 @@ pub struct Point {
     pub position: Vec3,
     /// Unit normal of the surface. Zero for a point of the light grid: light from each direction counts fully.
     pub normal: Vec3,
-    /// Its number among points whose mean is wanted, counted from 0: these follow one another in a list, and divide the
-    /// area of each light among their shadow rays.
+    /// Its number, from 0, among the points that are averaged with it, those of one texel: these follow one another in a
+    /// list, and divide the area of each light among their shadow rays.
     pub rank: u32,
 }
 

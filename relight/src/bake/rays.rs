@@ -83,14 +83,14 @@ impl Hints {
     }
 }
 
-/// Where the shadow rays of one point to one light end: points whose mean is wanted take other strata of the light.
+/// Where the shadow rays of one point to one light end: points that are averaged take other strata of the light each.
 struct Strata {
     places: Pairs,
     rank: u32,
 }
 
 impl Strata {
-    /// `first`: the number of the first of the points whose mean is wanted; `light`: unique for each light.
+    /// `first`: the number of the first of the points that are averaged; `light`: unique for each light.
     fn new(first: usize, light: u32, rank: u32) -> Strata {
         let own = (first as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
         Strata {

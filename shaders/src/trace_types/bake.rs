@@ -11,7 +11,7 @@ pub struct BakePoint {
     pub position: Vec3,
     /// Unit normal; zero: light from each direction counts fully.
     pub normal: Vec3,
-    /// Its number among points that follow one another and whose mean is wanted.
+    /// Its number among points that follow one another and are averaged.
     pub rank: u32,
 }
 
